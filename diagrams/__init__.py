@@ -1,0 +1,1 @@
+"""Scenarios (YAML) that say which station, which stages and which parameters to wire."""

@@ -1,0 +1,1 @@
+"""The wired diagrams, and the command line `riseg`."""

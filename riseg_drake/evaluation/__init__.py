@@ -1,0 +1,1 @@
+"""Scores as the field computes them, and the report made of them."""

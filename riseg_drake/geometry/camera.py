@@ -1,0 +1,59 @@
+"""The pinhole camera: pixels to rays, points to pixels."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Intrinsics:
+    """A pinhole camera without distortion; all in pixels, centre of the top left pixel at (0, 0)."""
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(height, width), as numpy wants it."""
+        return self.height, self.width
+
+
+@lru_cache(maxsize=8)
+def pixel_grid(height: int, width: int) -> NDArray[np.float32]:
+    """Pixel coordinates (u, v) of every pixel, [H, W, 2]. Shared and read-only."""
+    u, v = np.meshgrid(np.arange(width), np.arange(height))
+    grid = np.stack([u, v], axis=-1).astype(np.float32)
+    grid.flags.writeable = False
+    return grid
+
+
+@lru_cache(maxsize=8)
+def rays(intrinsics: Intrinsics) -> NDArray[np.float32]:
+    """The point at unit depth behind every pixel, [H, W, 3]. Shared and read-only."""
+    uv = pixel_grid(intrinsics.height, intrinsics.width)
+    directions = np.ones((*intrinsics.shape, 3), np.float32)
+    directions[..., 0] = (uv[..., 0] - intrinsics.cx) / intrinsics.fx
+    directions[..., 1] = (uv[..., 1] - intrinsics.cy) / intrinsics.fy
+    directions.flags.writeable = False
+    return directions
+
+
+def back_project(depth: NDArray, intrinsics: Intrinsics) -> NDArray[np.float32]:
+    """Points p_CQ [H, W, 3] in metres behind the pixels of a depth image [H, W]; 0 where invalid."""
+    return rays(intrinsics) * depth[..., None].astype(np.float32)
+
+
+def project(p_CQ: NDArray, intrinsics: Intrinsics) -> NDArray:
+    """Pixels (u, v) [..., 2] of points p_CQ [..., 3]; NaN for points not ahead of the camera."""
+    z = p_CQ[..., 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse_depth = np.where(z > 0, 1.0 / z, np.nan)
+    u = p_CQ[..., 0] * inverse_depth * intrinsics.fx + intrinsics.cx
+    v = p_CQ[..., 1] * inverse_depth * intrinsics.fy + intrinsics.cy
+    return np.stack([u, v], axis=-1)

@@ -1,0 +1,49 @@
+"""What the algorithm sees at one moment: I_t with the kinematics that belong to it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.camera import Intrinsics
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The RGB-D image I_t, and what theta_t says of the same moment.
+
+    Nobody writes into the arrays of a frame: several stages share them.
+    """
+
+    sequence: int
+    """Counts the frames of one run from 0."""
+    time: float
+    """When the image was taken, s."""
+    intrinsics: Intrinsics
+    color: NDArray[np.uint8]
+    """[H, W, 3], RGB."""
+    depth: NDArray[np.float32]
+    """[H, W], metres, 0 = invalid."""
+    X_WC: NDArray[np.float64]
+    """Pose of the camera, [4, 4], by forward kinematics from theta_t (or as recorded)."""
+    robot: NDArray[np.bool_]
+    """[H, W], the pixels that the robot itself covers."""
+
+
+@dataclass(frozen=True)
+class FramePair:
+    """(I_t-1, I_t) with their kinematics; `reference` is the paper's t-1, `current` its t."""
+
+    reference: Frame
+    current: Frame
+
+    @property
+    def X_C1C0(self) -> NDArray[np.float64]:
+        """The paper's camT_{t-1,t}: takes points of the camera at t-1 to the camera at t."""
+        return np.linalg.inv(self.current.X_WC) @ self.reference.X_WC
+
+
+def sanitize_depth(depth: NDArray) -> NDArray[np.float32]:
+    """Depth in metres as float32 with every spelling of "invalid" (NaN, inf, < 0) turned into 0."""
+    depth = np.asarray(depth, np.float32)
+    return np.where(np.isfinite(depth) & (depth > 0), depth, np.float32(0))

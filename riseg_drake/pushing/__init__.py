@@ -1,0 +1,1 @@
+"""Alg. 3 of the paper, FindAction, and the path of a push, on plain arrays."""

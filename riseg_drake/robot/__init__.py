@@ -1,0 +1,1 @@
+"""Robot: description, forward kinematics, and the pixels that the robot itself covers."""

@@ -1,0 +1,1 @@
+"""One contract of ports, and the stations that stand behind it."""

@@ -1,0 +1,1 @@
+"""Drake systems: thin doorways to the functions of the floors below."""
