@@ -74,8 +74,8 @@ def score(prediction: NDArray, ground_truth: NDArray) -> Scores:
         return _scores_of_nothing(len(predicted), len(true))
 
     tp = _overlaps(prediction, ground_truth, predicted, true)  # [true, predicted]
-    predicted_area = np.array([np.count_nonzero(prediction == j) for j in predicted])
-    true_area = np.array([np.count_nonzero(ground_truth == i) for i in true])
+    predicted_area = np.array([_area(prediction == j) for j in predicted])
+    true_area = np.array([_area(ground_truth == i) for i in true])
     p = tp / predicted_area[None, :]
     r = tp / true_area[:, None]
     with np.errstate(invalid="ignore"):
@@ -156,11 +156,11 @@ def _boundary_scores(
     prediction, ground_truth = prediction[around], ground_truth[around]
     b_predicted = [boundary_map(prediction == j) for j in predicted]
     b_true = [boundary_map(ground_truth == i) for i in true]
-    tp_p = sum(np.count_nonzero(b_predicted[j] & dilate(b_true[i], radius)) for i, j in pairs)
-    tp_r = sum(np.count_nonzero(b_true[i] & dilate(b_predicted[j], radius)) for i, j in pairs)
+    tp_p = sum(_area(b_predicted[j] & dilate(b_true[i], radius)) for i, j in pairs)
+    tp_r = sum(_area(b_true[i] & dilate(b_predicted[j], radius)) for i, j in pairs)
     return (
-        _ratio(tp_p, sum(np.count_nonzero(b) for b in b_predicted)),
-        _ratio(tp_r, sum(np.count_nonzero(b) for b in b_true)),
+        _ratio(tp_p, sum(_area(b) for b in b_predicted)),
+        _ratio(tp_r, sum(_area(b) for b in b_true)),
     )
 
 
@@ -172,6 +172,10 @@ def _around_objects(prediction: NDArray, ground_truth: NDArray) -> tuple[slice, 
         slice(max(v.min() - 1, 0), min(v.max() + 2, height)),
         slice(max(u.min() - 1, 0), min(u.max() + 2, width)),
     )
+
+
+def _area(mask: NDArray[np.bool_]) -> int:
+    return int(np.count_nonzero(mask))
 
 
 def _ratio(part: int, whole: int) -> float:
