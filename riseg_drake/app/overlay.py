@@ -39,7 +39,7 @@ def draw_overlay(color: NDArray[np.uint8], mask: NDArray) -> NDArray[np.uint8]:
     picture = np.where(objects[..., None], tinted, color)
 
     labels = mask.astype(np.uint16)
-    outline = cv2.morphologyEx(labels, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8)) > 0
+    outline = cv2.morphologyEx(labels, cv2.MORPH_GRADIENT, np.ones((5, 5), np.uint8)) > 0
     picture[outline & objects] = ids[outline & objects]
     for object_id in np.unique(mask[objects]):
         _write_number(picture, int(object_id), mask == object_id)

@@ -22,5 +22,5 @@ def test_background_stays_as_it_is_and_touching_objects_are_parted_by_their_outl
     picture = draw_overlay(color, mask)
     np.testing.assert_array_equal(picture[mask == 0], 200)
     np.testing.assert_array_equal(color, before)
-    np.testing.assert_array_equal(picture[22, 39], object_colors(np.array(1)))
+    np.testing.assert_array_equal(picture[25, 39], object_colors(np.array(1)))
     np.testing.assert_array_equal(picture[22, 40], object_colors(np.array(2)))
