@@ -1,8 +1,9 @@
 """What a toy touches the world with: small feet for the table, convex pieces for everything else.
 
-Point contact gives one contact for each pair of geometries. A flat box on a table would rock about its one
-point, so each toy stands on several small balls; and a silhouette that is not convex is cut into pieces that
-are nearly so, each bevelled like the solid it stands for and lifted off the table. Lengths in mm.
+Point contact gives one contact for each pair of geometries. A flat box on a table would rock about its
+one point, so each toy stands on several small balls; and a silhouette that is not convex is cut into
+pieces that are nearly so, each bevelled like the solid it stands for and lifted off the table.
+Lengths in mm.
 """
 
 from collections.abc import Sequence
@@ -10,10 +11,9 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
-
 from riseg_drake.models.objects.outlines import inward_distance
 from riseg_drake.models.objects.solids import Profile
+from scipy.spatial import ConvexHull
 
 RASTER = 0.5  # mm a pixel
 FOOT_RADIUS = 3.0
@@ -21,7 +21,7 @@ LIFT = 0.7  # of the convex pieces above the table
 
 
 def feet(loops: Sequence[NDArray], profile: Profile, count: int = 6) -> NDArray:
-    """Centres [k, 3] of balls that touch z = 0 just inside the rim of the flat underside, spread widely."""
+    """Centres [k, 3] of balls that touch z = 0 inside the rim of the flat underside, spread widely."""
     points, distance = _raster(loops)
     flat = points[distance >= max(profile.bottom_run, FOOT_RADIUS) + RASTER]
     corners = flat[ConvexHull(flat).vertices]

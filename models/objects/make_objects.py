@@ -12,7 +12,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-
 from riseg_drake.models.objects.collision import FOOT_RADIUS, convex_pieces, feet
 from riseg_drake.models.objects.outlines import trace
 from riseg_drake.models.objects.patterns import Pattern

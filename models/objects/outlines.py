@@ -1,11 +1,12 @@
 """Silhouettes of toys, drawn as strokes and polygons, traced into closed curves. All lengths in mm.
 
-A drawing is a signed distance field (negative inside) as a function of points [..., 2]; its parts are joined
-with `union`, cut with `minus`, and `trace` turns the result into loops: one outer curve, counterclockwise,
-and one clockwise curve for each hole.
+A drawing is a signed distance field (negative inside) as a function of points [..., 2]; its parts are
+joined with `union`, cut with `minus`, and `trace` turns the result into loops: one outer curve,
+counterclockwise, and one clockwise curve for each hole.
 """
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -20,7 +21,7 @@ def stroke(*nodes: tuple[float, float, float]) -> Field:
 
     def field(points: NDArray) -> NDArray:
         distance = np.full(points.shape[:-1], np.inf)
-        for start, end in zip(nodes[:-1], nodes[1:], strict=True):
+        for start, end in pairwise(nodes):
             a, b = np.array(start[:2]), np.array(end[:2])
             along = np.clip((points - a) @ (b - a) / np.dot(b - a, b - a), 0.0, 1.0)
             spine = a + along[..., None] * (b - a)
@@ -75,7 +76,7 @@ def minus(field: Field, *holes: Field) -> Field:
 
 
 def inward_distance(points: NDArray, loops: Sequence[NDArray]) -> tuple[NDArray, NDArray]:
-    """Distance [...] of points [..., 2] to the loops, positive inside, and the nearest points [..., 2]."""
+    """Distance [...] of points [..., 2] to the loops, positive inside, and nearest points [..., 2]."""
     flat = points.reshape(-1, 2)
     best = np.full(len(flat), np.inf)
     nearest = np.zeros_like(flat)
@@ -98,7 +99,7 @@ def inward_distance(points: NDArray, loops: Sequence[NDArray]) -> tuple[NDArray,
 def trace(
     field: Field, softening: float = 1.2, spacing: float = 2.8, reach: float = 75.0
 ) -> list[NDArray]:
-    """The closed curves [n, 2] around a drawing: sharp corners softened, points about `spacing` mm apart."""
+    """The closed curves [n, 2] around a drawing, its corners softened, a point every `spacing` mm."""
     axis = np.arange(-reach, reach, RASTER)
     distance = field(np.stack(np.meshgrid(axis, axis), axis=-1))
     soft = cv2.GaussianBlur(distance, (0, 0), softening / RASTER)

@@ -1,7 +1,7 @@
 """Paint for the toys: functions of a point on the flat texture, in mm, that give a colour.
 
-A pattern is called as `pattern(points, rng)` with points [..., 2] and returns RGB [..., 3] in 0..1. All toys
-share one small palette, so that colour says little about where one toy ends and the next begins.
+A pattern is called as `pattern(points, rng)` with points [..., 2] and returns RGB [..., 3] in 0..1. All
+toys share one small palette, so that colour says little about where one toy ends and the next begins.
 """
 
 from collections.abc import Callable, Sequence
@@ -38,7 +38,7 @@ def plain(name: str) -> Pattern:
 
 
 def cells(size: float, joint: float, names: Sequence[str], joint_name: str) -> Pattern:
-    """Irregular cells about `size` mm wide with joints between them: a giraffe, a tortoise, crazy paving."""
+    """Irregular cells about `size` mm wide with joints between them: a giraffe, crazy paving."""
 
     def pattern(points: NDArray, rng: np.random.Generator) -> NDArray:
         seeds = _scatter(points, size, 0.38, rng)
@@ -54,7 +54,7 @@ def cells(size: float, joint: float, names: Sequence[str], joint_name: str) -> P
 def spots(
     base: Pattern, pitch: float, radius: float, names: Sequence[str], ring: str | None = None
 ) -> Pattern:
-    """Round spots over a base pattern; with `ring`, each spot gets a broken ring: a leopard's rosettes."""
+    """Round spots over a base pattern; `ring` gives each a broken ring: a leopard's rosettes."""
 
     def pattern(points: NDArray, rng: np.random.Generator) -> NDArray:
         image = base(points, rng)
@@ -73,7 +73,7 @@ def spots(
 
 
 def stripes(width: float, names: Sequence[str], degrees: float = 0.0, waviness: float = 0.0) -> Pattern:
-    """Stripes `width` mm wide, across the direction `degrees`, their edges wandering by `waviness` mm."""
+    """Stripes `width` mm wide across the direction `degrees`, wandering by `waviness` mm."""
     direction = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
 
     def pattern(points: NDArray, rng: np.random.Generator) -> NDArray:
@@ -141,7 +141,7 @@ def sprinkles(
 def wedges(
     number: int, base: Sequence[str], spoke: str, radii: Sequence[float], rim: Sequence[str]
 ) -> Pattern:
-    """A cut citrus or a wheel: `number` wedges with spokes between them, then a rim band beyond each radius."""
+    """A cut citrus: `number` wedges with spokes between them, then a band of rim beyond each radius."""
 
     def pattern(points: NDArray, rng: np.random.Generator) -> NDArray:
         radius = np.hypot(*np.moveaxis(points, -1, 0)) + 0.6 * _noise(points, 5.0, rng)
@@ -180,7 +180,7 @@ def grained(base: Pattern, strength: float = 0.1, size: float = 2.0) -> Pattern:
 
 
 def _scatter(points: NDArray, pitch: float, jitter: float, rng: np.random.Generator) -> NDArray:
-    """One point in each hexagonal cell of a lattice that covers the points, moved by `jitter` pitches."""
+    """A hexagonal lattice that covers the points, each node moved by up to `jitter` pitches."""
     low, high = (
         points.reshape(-1, 2).min(axis=0) - 2 * pitch,
         points.reshape(-1, 2).max(axis=0) + 2 * pitch,

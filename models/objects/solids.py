@@ -1,4 +1,4 @@
-"""From a silhouette to a solid with rounded edges: a closed triangle mesh, its texture coordinates, its mass.
+"""From a silhouette to a solid with rounded edges: a closed mesh, its texture coordinates, its mass.
 
 Lengths in mm here; `make_objects` writes metres. A solid stands on z = 0. At inward distance d from the
 silhouette its surface runs from `Profile.bottom(d)` up to `Profile.top(d)`.
@@ -9,9 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay
-
 from riseg_drake.models.objects.outlines import inward_distance
+from scipy.spatial import Delaunay
 
 RING_ANGLES = np.radians([28.0, 58.0, 90.0])  # where the rounded rim gets vertices, from the wall up
 GRID = 7.0  # mm between vertices on the flat part of the top
@@ -97,8 +96,8 @@ def solid(loops: Sequence[NDArray], profile: Profile, rng: np.random.Generator) 
 def mass_properties(vertices: NDArray, faces: NDArray) -> tuple[float, NDArray, NDArray]:
     """Volume, centre of volume [3], and inertia about it per unit density [3, 3], of a closed mesh.
 
-    Sums signed tetrahedra from the origin; the second moments of a tetrahedron with corners 0, a, b, c are
-    det(a, b, c) / 120 * (sum of all pairs of corners, equal ones twice).
+    Sums signed tetrahedra from the origin; the second moments of one with corners 0, a, b, c are
+    det(a, b, c) / 120 * (sum over all pairs of corners, equal ones twice).
     """
     corners = vertices[faces]  # [m, 3, 3]
     determinant = np.linalg.det(corners)
@@ -153,7 +152,7 @@ def _triangles(xy: NDArray, loops: Sequence[NDArray]) -> NDArray:
 
 
 def _wall(loops: Sequence[NDArray], below: int) -> NDArray:
-    """Two triangles for each step along the rim; the lower rim's vertices come `below` after the upper's."""
+    """Two triangles a step along the rim; the lower rim's vertices come `below` after the upper's."""
     faces, start = [], 0
     for loop in loops:
         i = start + np.arange(len(loop))

@@ -1,9 +1,8 @@
-"""The toys: for each a silhouette, a profile, a pattern, a density and a friction coefficient. Lengths in mm."""
+"""The toys: for each a silhouette, a profile, a pattern, a density and a friction. Lengths in mm."""
 
 from dataclasses import dataclass
 
 import numpy as np
-
 from riseg_drake.models.objects.outlines import (
     Field,
     arc,
