@@ -97,7 +97,7 @@ SHELLS: dict[str, list[Drum | Slab]] = {
     ],
     "link5_cap": [Drum((0, 0.127, 0), "y", 0.038, 0.006, 0.004)],
     # Wrist: from the drum on joint 6 across 88 mm to the motor that stands on joint 7.
-    "link6_shell": [Drum((0, 0, 0.0), "z", 0.05, 0.05), Drum((0.088, 0.012, 0), "y", 0.048, 0.052)],
+    "link6_shell": [Drum((0, 0, 0), "z", 0.05, 0.05, 0.02), Drum((0.088, 0.012, 0), "y", 0.048, 0.052)],
     "link6_motor": [Drum((0.088, 0.068, 0), "y", 0.04, 0.014, 0.01)],
     "link6_cap": [Drum((0, 0, 0.053), "z", 0.038, 0.006, 0.004)],
     "link7_shell": [
