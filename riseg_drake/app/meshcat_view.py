@@ -79,7 +79,9 @@ class MeshcatView(LeafSystem):
         if before:
             self._meshcat.SetProperty(before, "visible", False, time)
         if path:
-            self._meshcat.SetProperty(path, "visible", False, 0.0)  # in the replay: not from the beginning
+            self._meshcat.SetProperty(
+                path, "visible", False, 0.0
+            )  # in the replay: not from the beginning
             self._meshcat.SetProperty(path, "visible", True, time)
         self._paths[kind] = path
 

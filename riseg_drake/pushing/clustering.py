@@ -63,7 +63,9 @@ def clusterings(
     """
     if parameters.method not in METHODS:
         raise ValueError(f"clustering method '{parameters.method}' does not exist; use one of {METHODS}")
-    chosen = rng.choice(len(p_WQ), parameters.sample, replace=False) if len(p_WQ) > parameters.sample else ...
+    chosen = (
+        rng.choice(len(p_WQ), parameters.sample, replace=False) if len(p_WQ) > parameters.sample else ...
+    )
     sample = p_WQ[chosen]
     if parameters.method == "mean-shift":
         for bandwidth in parameters.bandwidth * 0.7 ** np.arange(4):
@@ -88,7 +90,9 @@ def elbow(inertia: NDArray, threshold: float) -> int:
     """
     if len(inertia) < 3:
         return 1
-    relative = np.log(np.maximum(inertia, 1e-12 * max(inertia[0], 1e-12)) * np.arange(1, len(inertia) + 1))
+    relative = np.log(
+        np.maximum(inertia, 1e-12 * max(inertia[0], 1e-12)) * np.arange(1, len(inertia) + 1)
+    )
     bend = relative[:-2] - 2 * relative[1:-1] + relative[2:]
     sharpest = int(np.argmax(bend))
     return sharpest + 2 if bend[sharpest] > threshold else 1
