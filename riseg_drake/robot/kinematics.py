@@ -112,7 +112,7 @@ class PandaKinematics:
         return min((pair.distance for pair in pairs), default=reach)
 
     def postures(self, X_WE: NDArray, margin: float = LIMIT_MARGIN) -> NDArray[np.float64]:
-        """A dense sample [N, 7] of the postures with the tip at X_WE [4, 4], `margin` rad inside limits."""
+        """A dense sample [N, 7] of postures with the tip at X_WE [4, 4], `margin` rad inside limits."""
         q = panda_postures(X_WE @ self.X_EF, _FREE_ANGLES)
         return q[(PANDA_LIMITS.room(q) >= margin).all(axis=1)]
 
@@ -123,7 +123,7 @@ class PandaKinematics:
         margin: float = LIMIT_MARGIN,
         min_clearance: float = MIN_CLEARANCE,
     ) -> NDArray[np.float64] | None:
-        """Joint angles [7] that bring the tip exactly to X_WE [4, 4], free of collision; None if none do.
+        """Joint angles [7] with the tip exactly at X_WE [4, 4], free of collision, or None.
 
         Of all such postures the one nearest to q_near [7] is taken (largest joint difference), with some
         liking for room to the joints' limits.
@@ -142,7 +142,7 @@ class PandaKinematics:
         margin: float = LIMIT_MARGIN,
         min_clearance: float = MIN_CLEARANCE,
     ) -> list[NDArray[np.float64]] | None:
-        """Joint angles [7] for each pose X_WE [4, 4] of a path, without a jump; q_start is near its first.
+        """Joint angles [7] for each pose X_WE [4, 4] of a path, without a jump; q_start is near the first.
 
         Newton steps on the pose; the spare freedom is spent on staying off the joints' limits. None
         where the path leaves the limits by `margin`, touches something, or cannot be followed. Poses

@@ -19,7 +19,7 @@ _SUBPIXEL_BITS = 4
 
 @dataclass(frozen=True)
 class _Hull:
-    """A convex piece of a body: its corners [N, 3] in the body's frame, and the edges [M, 2] between them."""
+    """A convex piece of a body: corners [N, 3] in the body's frame, and the edges [M, 2] between."""
 
     body: RigidBody
     corners: NDArray[np.float64]
@@ -70,7 +70,7 @@ class RobotSilhouette:
             uv.min(axis=0) > (k.width + margin, k.height + margin)
         ).any():
             return
-        # Far outside the picture a coordinate would overflow; at that distance only its direction counts.
+        # Far outside the picture a coordinate would overflow; out there only its direction counts.
         uv = np.clip(uv, -20 * k.width, 20 * k.width)
         outline = cv2.convexHull(np.round(uv * (1 << _SUBPIXEL_BITS)).astype(np.int32))
         cv2.fillConvexPoly(image, outline, 1, shift=_SUBPIXEL_BITS)
@@ -78,7 +78,7 @@ class RobotSilhouette:
 
 
 def _ahead_of_camera(p_CQ: NDArray, edges: NDArray) -> NDArray | None:
-    """The part of a convex body at z >= NEAR: its corners there and where its edges pierce that plane."""
+    """The part of a convex body at z >= NEAR: corners there, and where edges pierce that plane."""
     z = p_CQ[:, 2]
     if z.max() <= NEAR:
         return None

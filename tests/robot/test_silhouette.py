@@ -22,7 +22,7 @@ D415 = Intrinsics(640, 480, 616.285, 615.778, 301.418, 232.864)
 
 @pytest.fixture(scope="module")
 def rendered_robot():
-    """A function q -> bool [H, W] that lets Drake draw the robot, and nothing else, into a label image."""
+    """A function q -> bool [H, W]: where Drake's label image shows the robot."""
     builder = RobotDiagramBuilder(time_step=0.0)
     plant, scene_graph = builder.plant(), builder.scene_graph()
     frame = add_panda(plant, PandaDescription()).camera_frame
