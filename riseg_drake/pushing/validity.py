@@ -94,7 +94,8 @@ def accessible(
     )
     across = _steps(-pusher.width / 2 - margin, pusher.width / 2 + margin, table)
     area = rectangle(b_W, direction_W, along, across)
-    return ~table.lookup(table.objects, area).any(axis=(1, 2))
+    occupied: NDArray[np.bool_] = np.any(table.lookup(table.objects, area), axis=(1, 2))
+    return ~occupied
 
 
 def overlap_after_push(
