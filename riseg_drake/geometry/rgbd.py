@@ -43,6 +43,11 @@ class FramePair:
         return np.linalg.inv(self.current.X_WC) @ self.reference.X_WC
 
 
+def unhidden_depth(frame: Frame) -> NDArray[np.float32]:
+    """The frame's depth [H, W], m, with 0 (invalid) where the robot is in the way."""
+    return np.where(frame.robot, np.float32(0), frame.depth)
+
+
 def sanitize_depth(depth: NDArray) -> NDArray[np.float32]:
     """Depth in metres as float32 with every spelling of "invalid" (NaN, inf, < 0) turned into 0."""
     depth = np.asarray(depth, np.float32)
