@@ -10,11 +10,12 @@ from riseg_drake.pushing.boundary import BoundaryParameters, boundary
 from riseg_drake.pushing.clusters import Cluster, ClustersParameters, find_clusters
 from riseg_drake.pushing.contact import find_contacts
 from riseg_drake.pushing.objects_to_segment import ObjectsToSegmentParameters, objects_to_segment
-from riseg_drake.pushing.push import Push, TriedPush
+from riseg_drake.pushing.push import Push
 from riseg_drake.pushing.push_path import PushPath
 from riseg_drake.pushing.pusher import Pusher
 from riseg_drake.pushing.ranking import RankingParameters, cost_of_pushes
 from riseg_drake.pushing.table_map import TableMap, TableMapParameters
+from riseg_drake.pushing.tried_pushes import TriedPush
 from riseg_drake.pushing.validity import ValidityParameters, is_valid_push
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.pushing.contact import Contacts
-from riseg_drake.pushing.push import TriedPush
 from riseg_drake.pushing.table_map import TableMap
+from riseg_drake.pushing.tried_pushes import TriedPush
 from riseg_drake.pushing.validity import ValidityParameters, overlap_after_push
 
 
