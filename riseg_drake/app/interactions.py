@@ -10,7 +10,7 @@ from pydrake.systems.framework import Context, EventStatus
 from riseg_drake.app.diagram import WiredDiagram
 from riseg_drake.app.output import Step, motion_between
 from riseg_drake.evaluation.scores import score
-from riseg_drake.geometry.rgbd import Frame, FramePair
+from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pushing.push import ArmPhase
 from riseg_drake.systems.stage_clock import StageClock
 
@@ -23,7 +23,7 @@ class Progress:
     """How far a run has come; renewed at every camera frame."""
 
     interaction_step: int = 0
-    """Interactions that were begun."""
+    """The interaction that is under way; 0 before the first."""
     phase: ArmPhase = ArmPhase.OBSERVE
     objects: int = 0
     """Objects found so far."""
@@ -38,14 +38,13 @@ def interactions(
     wired: WiredDiagram,
     clock: StageClock,
     progress: Progress,
-    most_interactions: int,
     longest: float,
     listeners: tuple[Listener, ...] = (),
 ) -> Iterator[Step]:
     """Run Alg. 1; yields how things stand before the first and after every interaction.
 
-    It ends when no push is left (a_i = null), after `most_interactions`, or when `longest` seconds were
-    simulated; `progress.end` says which.
+    It ends when the arm is done (no push is left, a_i = null, or enough were made), or when `longest`
+    seconds were simulated; `progress.end` says which.
     """
     clock.watch(wired.stages)
     simulator = Simulator(wired.diagram)
@@ -55,60 +54,50 @@ def interactions(
     book = _Book(wired, context, clock)
     simulator.Initialize()
     while not progress.end:  # line 4
-        simulator.AdvanceTo(longest)  # lines 5 to 8, up to the next frame or the arm's next phase
-        frame = news.frame()
-        progress.time = context.get_time()
-        if frame is not None and news.is_first_look():
+        simulator.AdvanceTo(longest)  # lines 5 to 8, up to the next mask or the arm's next phase
+        if news.mask_is_new:
+            news.mask_is_new = False
             progress.frames += 1
-            progress.objects = wired.objects(context)
+            progress.objects = len(wired.segmentation(context).object_ids)
             book.frames += 1
             for listener in listeners:
-                listener(frame, context)
+                listener(news.frame, context)
         decided = progress.phase is ArmPhase.OBSERVE and news.phase is not ArmPhase.OBSERVE
-        progress.phase = news.phase
-        if decided and frame is not None:
-            # The arm has looked and chosen, but not moved yet: the frame and the truth show one moment.
-            yield book.close(progress.interaction_step, frame)  # line 10
-            if news.phase is ArmPhase.DONE:
-                progress.end = "there is nothing left that it can push"
-            elif progress.interaction_step == most_interactions:
-                progress.end = f"{most_interactions} interactions were asked for"
-            else:
-                progress.interaction_step += 1  # line 9
+        progress.time, progress.phase = context.get_time(), news.phase
+        if decided:
+            # The arm has looked and chosen, but not moved yet: picture, mask and truth are of one moment.
+            yield book.close(wired.interaction_step(context), news.frame)  # line 10
+            progress.interaction_step += 1  # line 9
+        if news.phase is ArmPhase.DONE:
+            progress.end = "the arm is done: no push left, or as many made as were asked for"
         elif progress.time >= longest:
             progress.end = f"{longest:g} s were simulated"
 
 
 class _News:
-    """Stops the simulator when there is a new frame, or the arm begins something else."""
+    """Stops the simulator when there is a new mask, or the arm begins something else."""
+
+    frame: Frame
+    """I_t of the newest mask; not there before the first."""
 
     def __init__(self, wired: WiredDiagram):
         self.phase = ArmPhase.OBSERVE
+        self.mask_is_new = False
         self._wired = wired
-        self._pair: FramePair | None = None
-        self._looked_at = -1
+        self._sequence = -1
 
     def look(self, context: Context) -> EventStatus:
-        """The simulator's monitor; it is called after every step, a thousand times a second."""
+        """The simulator's monitor; it is called after every step, hundreds of times a second."""
         phase = self._wired.phase(context)
-        self._pair = self._wired.pair(context)
-        if phase is self.phase and self._sequence() == self._looked_at:
+        sequence = self._wired.segmentation(context).sequence
+        if phase is self.phase and sequence == self._sequence:
             return EventStatus.DidNothing()
+        if sequence != self._sequence:
+            pair = self._wired.pair(context)
+            assert pair is not None
+            self.frame, self.mask_is_new, self._sequence = pair.current, True, sequence
         self.phase = phase
         return EventStatus.ReachedTermination(self._wired.diagram, "news")
-
-    def frame(self) -> Frame | None:
-        """I_t, once there is one."""
-        return None if self._pair is None else self._pair.current
-
-    def is_first_look(self) -> bool:
-        """Whether this is asked about the present frame for the first time."""
-        first = self._sequence() != self._looked_at
-        self._looked_at = self._sequence()
-        return first
-
-    def _sequence(self) -> int:
-        return -1 if self._pair is None else self._pair.current.sequence
 
 
 @dataclass
@@ -125,7 +114,7 @@ class _Book:
         """The step that ends now; the count starts anew."""
         mask = self.wired.mask(self.context)
         ground_truth = self.wired.true_labels(self.context)
-        poses = self.wired.object_poses(self.context)
+        poses = self.wired.true_poses(self.context)
         step = Step(
             interaction_step=interaction_step,
             time=frame.time,

@@ -60,15 +60,14 @@ def run(
     with ExitStack() as stack:
         stack.enter_context(_state_of(folder, progress, steps))
         wired = make_diagram(scenario, seed, meshcat)
+        folder.note(objects={str(object_id): name for object_id, name in wired.object_names.items()})
         listeners: list[Listener] = [lambda *_: narrator.follow(progress)]
         if record:
             writer = stack.enter_context(RecordingWriter(folder.path / RECORDING, wired.intrinsics))
             listeners.append(_recorder(wired, writer))
         if meshcat is not None:
             stack.enter_context(_replay(meshcat, folder.path / REPLAY))
-        for step in interactions(
-            wired, StageClock(), progress, scenario.most_interactions, scenario.longest, tuple(listeners)
-        ):
+        for step in interactions(wired, StageClock(), progress, scenario.longest, tuple(listeners)):
             folder.write_step(step)
             steps.append(step)
             narrator.tell_step(step)
@@ -122,8 +121,8 @@ def _state_of(folder: RunFolder, progress: Progress, steps: list[Step]) -> Itera
     start = perf_counter()
 
     def finish(state: str, end: str) -> None:
-        folder.finish(
-            state,
+        folder.note(
+            state=state,
             end=end,
             seconds=round(perf_counter() - start, 2),
             simulated_s=round(progress.time, 3),
