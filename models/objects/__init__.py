@@ -1,0 +1,1 @@
+"""Toy food and patterned animals, and the programs that draw them: outline, solid, paint, collision."""
