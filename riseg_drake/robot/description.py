@@ -1,0 +1,84 @@
+"""Which arm, with which tool: from model files into a MultibodyPlant."""
+
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame, ModelInstanceIndex
+
+MODELS_PACKAGE = "riseg_drake_models"
+JOINT_NAMES = tuple(f"panda_joint{i}" for i in range(1, 8))
+
+
+@dataclass
+class PandaDescription:
+    """The arm, and the pusher with its camera. URLs are `package://` or `file://`."""
+
+    arm_url: str = f"package://{MODELS_PACKAGE}/panda/panda.urdf"
+    """Or the official description: package://drake_models/franka_description/urdf/panda_arm.urdf."""
+    pusher_url: str = f"package://{MODELS_PACKAGE}/pusher/pusher.sdf"
+    """A model with a link `pusher`, to be bolted to the flange, and the frames `tip` and `camera`."""
+    drake_models: str = ""
+    """Folder of an offline copy of the package drake_models; empty: Drake's own, which it downloads."""
+    tool_yaw: float = 0.0
+    """Angle about the flange's z axis from the flange (panda_link8) to the tip frame E, rad."""
+
+
+@dataclass(frozen=True)
+class PandaParts:
+    """Where to find the arm's pieces in a plant."""
+
+    arm: ModelInstanceIndex
+    pusher: ModelInstanceIndex
+    tip_frame: Frame
+    """E."""
+    camera_frame: Frame
+    """C, colour optical frame."""
+
+
+def models_folder() -> Path:
+    """The project's own model files, in a checkout and in an installed copy alike."""
+    return Path(str(files("riseg_drake.models")))
+
+
+def register_models(parser: Parser) -> None:
+    """Make `package://riseg_drake_models/...` known to a parser."""
+    packages = parser.package_map()
+    if not packages.Contains(MODELS_PACKAGE):
+        packages.Add(MODELS_PACKAGE, str(models_folder()))
+
+
+def add_panda(plant: MultibodyPlant, description: PandaDescription) -> PandaParts:
+    """Add the arm, standing on the table's level at the origin of W, with pusher and camera.
+
+    Raises ValueError where an option names something that is not there.
+    """
+    parser = Parser(plant)
+    register_models(parser)
+    if description.drake_models:
+        package_xml = Path(description.drake_models) / "package.xml"
+        if not package_xml.is_file():
+            raise ValueError(
+                f"drake_models: {description.drake_models} has no package.xml; name the folder of a copy "
+                "of RobotLocomotion/models, or leave it empty"
+            )
+        parser.package_map().Remove("drake_models")
+        parser.package_map().AddPackageXml(str(package_xml))
+    (arm,) = parser.AddModels(url=description.arm_url)
+    (pusher,) = parser.AddModels(url=description.pusher_url)
+    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("panda_link0", arm))
+    plant.WeldFrames(
+        plant.GetFrameByName("panda_link8", arm),
+        plant.GetFrameByName("pusher", pusher),
+        RigidTransform(RollPitchYaw(0, 0, description.tool_yaw), np.zeros(3)),
+    )
+    return PandaParts(
+        arm=arm,
+        pusher=pusher,
+        tip_frame=plant.GetFrameByName("tip", pusher),
+        camera_frame=plant.GetFrameByName("camera", pusher),
+    )

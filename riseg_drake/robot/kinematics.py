@@ -1,0 +1,204 @@
+"""Where the arm is, how it gets to a pose, and what it is about to touch."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import Box, CollisionFilterDeclaration, GeometrySet, SceneGraphInspector
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import CoulombFriction
+from pydrake.multibody.tree import Frame, JacobianWrtVariable
+from pydrake.planning import RobotDiagramBuilder
+
+from riseg_drake.robot.description import PandaDescription, add_panda
+from riseg_drake.robot.inverse import panda_postures
+from riseg_drake.robot.limits import PANDA_LIMITS
+
+LIMIT_MARGIN = 0.05
+"""Room that solutions keep to the ends of the joints' ranges, rad."""
+MIN_CLEARANCE = 0.003
+"""Room that solutions keep between arm, tool and table, m."""
+
+READY = np.array([0.0, -0.1, 0.0, -2.4, 0.0, 2.3, 0.0])
+"""An elbow-up posture in the middle of the arm's room, tool pointing down, rad; where a search starts."""
+
+_FREE_ANGLES = np.linspace(PANDA_LIMITS.position_lower[6], PANDA_LIMITS.position_upper[6], 181)
+_TABLE_SIZE = (4.0, 4.0, 1.0)
+
+
+def tip_pointing_down(p_WE: Sequence[float] | NDArray, yaw: float) -> NDArray[np.float64]:
+    """X_WE [4, 4] with the tip at p_WE, the tool upright, and E's x axis (the push) at `yaw` about W's z."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    X_WE = np.eye(4)
+    X_WE[:3, :3] = np.array([[c, s, 0], [s, -c, 0], [0, 0, -1]])
+    X_WE[:3, 3] = p_WE
+    return X_WE
+
+
+class PandaKinematics:
+    """The arm with its tool, alone above the table z = 0. Not for use by several threads at once."""
+
+    def __init__(self, description: PandaDescription | None = None):
+        builder = RobotDiagramBuilder(time_step=0.0)
+        self.plant = builder.plant()
+        self.parts = add_panda(self.plant, description or PandaDescription())
+        table = self.plant.RegisterCollisionGeometry(
+            self.plant.world_body(),
+            RigidTransform([0, 0, -_TABLE_SIZE[2] / 2]),
+            Box(*_TABLE_SIZE),
+            "table",
+            CoulombFriction(1, 1),
+        )
+        self.plant.Finalize()
+        base = self.plant.GetBodyByName("panda_link0", self.parts.arm)
+        builder.scene_graph().collision_filter_manager().Apply(
+            CollisionFilterDeclaration().ExcludeBetween(
+                GeometrySet(table), GeometrySet(self.plant.GetCollisionGeometriesForBody(base))
+            )
+        )
+        self._diagram = builder.Build()
+        self._root = self._diagram.CreateDefaultContext()
+        self._context = self._diagram.mutable_plant_context(self._root)
+        self._flange = self.plant.GetFrameByName("panda_link8", self.parts.arm)
+        self.X_EC = self.camera_frame.CalcPose(self._context, self.tip_frame).GetAsMatrix4()
+        """Pose of the camera on the tool, [4, 4]."""
+        self.X_EF = self._flange.CalcPose(self._context, self.tip_frame).GetAsMatrix4()
+        """Pose of the flange (panda_link8) seen from the tip, [4, 4]."""
+
+    @property
+    def tip_frame(self) -> Frame:
+        """E, the tip of the pusher."""
+        return self.parts.tip_frame
+
+    @property
+    def camera_frame(self) -> Frame:
+        """C, the camera's optical frame."""
+        return self.parts.camera_frame
+
+    @property
+    def inspector(self) -> SceneGraphInspector:
+        """What shapes the arm and its tool have."""
+        return self._diagram.scene_graph().model_inspector()
+
+    def X_WA(self, q: NDArray, frame: Frame) -> NDArray[np.float64]:
+        """Pose [4, 4] of any frame of `plant` at joint angles q [7], rad."""
+        self.plant.SetPositions(self._context, q)
+        return frame.CalcPoseInWorld(self._context).GetAsMatrix4()
+
+    def X_WC(self, q: NDArray) -> NDArray[np.float64]:
+        """Pose of the camera's optical frame at q [7], [4, 4]."""
+        return self.X_WA(q, self.camera_frame)
+
+    def X_WE(self, q: NDArray) -> NDArray[np.float64]:
+        """Pose of the pusher's tip at q [7], [4, 4]."""
+        return self.X_WA(q, self.tip_frame)
+
+    def tip_jacobian(self, q: NDArray) -> NDArray[np.float64]:
+        """J [6, 7] with V_WE = J dq/dt, V_WE = [omega; v] of E measured and expressed in W."""
+        self.plant.SetPositions(self._context, q)
+        world = self.plant.world_frame()
+        return self.plant.CalcJacobianSpatialVelocity(
+            self._context, JacobianWrtVariable.kV, self.tip_frame, np.zeros(3), world, world
+        )
+
+    def clearance(self, q: NDArray, reach: float = 0.1) -> float:
+        """Smallest signed distance of arm, pusher and camera to the table and among each other, m.
+
+        Negative where they penetrate; `reach` where nothing is nearer than that.
+        """
+        self.plant.SetPositions(self._context, q)
+        query = self.plant.get_geometry_query_input_port().Eval(self._diagram.plant_context(self._root))
+        pairs = query.ComputeSignedDistancePairwiseClosestPoints(reach)
+        return min((pair.distance for pair in pairs), default=reach)
+
+    def postures(self, X_WE: NDArray, margin: float = LIMIT_MARGIN) -> NDArray[np.float64]:
+        """A dense sample [N, 7] of the postures with the tip at X_WE [4, 4], within limits by `margin` rad."""
+        q = panda_postures(X_WE @ self.X_EF, _FREE_ANGLES)
+        return q[(PANDA_LIMITS.room(q) >= margin).all(axis=1)]
+
+    def solve_ik(
+        self,
+        X_WE: NDArray,
+        q_near: NDArray = READY,
+        margin: float = LIMIT_MARGIN,
+        min_clearance: float = MIN_CLEARANCE,
+    ) -> NDArray[np.float64] | None:
+        """Joint angles [7] with the tip exactly at X_WE [4, 4], free of collision; None where there are none.
+
+        Of all such postures the one nearest to q_near [7] is taken (largest joint difference), with some
+        liking for room to the joints' limits.
+        """
+        q = self.postures(X_WE, margin)
+        order = np.argsort(np.abs(q - q_near).max(axis=1) - 0.2 * PANDA_LIMITS.room(q).min(axis=1))
+        for candidate in q[order]:
+            if self.clearance(candidate) >= min_clearance:
+                return candidate
+        return None
+
+    def trace_ik(
+        self,
+        path: Sequence[NDArray],
+        q_start: NDArray,
+        margin: float = LIMIT_MARGIN,
+        min_clearance: float = MIN_CLEARANCE,
+    ) -> list[NDArray[np.float64]] | None:
+        """Joint angles [7] for every pose X_WE [4, 4] of a path, without a jump, from a posture near its first.
+
+        Newton steps on the pose; the spare freedom is spent on staying away from the joints' limits. None
+        where the path leaves the limits by `margin`, touches something, or cannot be followed. Poses
+        should be no more than some 2 cm or 0.1 rad apart.
+        """
+        traced = []
+        q = np.asarray(q_start, np.float64)
+        for X_WE in path:
+            step = self._follow(X_WE, q)
+            if (
+                step is None
+                or not PANDA_LIMITS.contains(step, margin)
+                or self.clearance(step) < min_clearance
+            ):
+                return None
+            q = step
+            traced.append(q)
+        return traced
+
+    def _follow(self, X_WE: NDArray, q: NDArray) -> NDArray[np.float64] | None:
+        """The posture at X_WE that continues q: converged to 1 um and 1 urad, or None."""
+        half_range = (PANDA_LIMITS.position_upper - PANDA_LIMITS.position_lower) / 2
+        for iteration in range(20):
+            error = pose_error(self.X_WE(q), X_WE)
+            if np.abs(error).max() < 1e-6:
+                return q
+            J = self.tip_jacobian(q)
+            J_pinv = J.T @ np.linalg.solve(J @ J.T + 1e-8 * np.eye(6), np.eye(6))
+            dq = J_pinv @ error
+            if iteration == 0:
+                # Grows steeply near a limit; its share of the step is bounded so that the path stays smooth.
+                crowding = ((q - PANDA_LIMITS.position_middle) / half_range) ** 5 / half_range
+                away = -(crowding - J_pinv @ (J @ crowding))
+                dq += 0.3 * np.linalg.norm(error) * np.clip(away, -1, 1)
+            q = q + np.clip(dq, -0.3, 0.3)
+        return None
+
+
+def pose_error(X_WA: NDArray, X_WB: NDArray) -> NDArray[np.float64]:
+    """The small twist [omega; p] [6], expressed in W, that carries A onto B (to first order in the angle)."""
+    R_AB_W = X_WB[:3, :3] @ X_WA[:3, :3].T
+    twisting = np.array(
+        [R_AB_W[2, 1] - R_AB_W[1, 2], R_AB_W[0, 2] - R_AB_W[2, 0], R_AB_W[1, 0] - R_AB_W[0, 1]]
+    )
+    return np.concatenate([twisting / 2, X_WB[:3, 3] - X_WA[:3, 3]])
+
+
+def observe_pose(
+    p_WT: Sequence[float] | NDArray, height: float, X_EC: NDArray, yaw: float = 0.0
+) -> NDArray[np.float64]:
+    """X_WE [4, 4] with the camera looking straight down at p_WT [3] from `height` m above it.
+
+    `yaw` is the direction of the image's upper edge about W's z axis; 0 is away from the robot, so that
+    the pusher stands on the robot's side of what is looked at.
+    """
+    X_WE = tip_pointing_down(np.zeros(3), yaw)
+    p_EC_W = X_WE[:3, :3] @ X_EC[:3, 3]
+    X_WE[:3, 3] = np.asarray(p_WT, np.float64) + [0, 0, height] - p_EC_W
+    return X_WE

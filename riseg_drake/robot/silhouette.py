@@ -1,0 +1,131 @@
+"""The pixels that the robot covers in its own camera, from its joint angles alone."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import Box, Capsule, Convex, Cylinder, Mesh, Role, Shape, Sphere
+from pydrake.multibody.tree import RigidBody
+from scipy.spatial import ConvexHull
+
+from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.robot.kinematics import PandaKinematics
+
+NEAR = 0.01
+"""What is nearer to the camera's centre than this is not drawn, m."""
+_SUBPIXEL_BITS = 4
+
+
+@dataclass(frozen=True)
+class _Hull:
+    """A convex piece of a body: its corners [N, 3] in the body's frame, and the edges [M, 2] between them."""
+
+    body: RigidBody
+    corners: NDArray[np.float64]
+    edges: NDArray[np.intp]
+
+
+class RobotSilhouette:
+    """Draws the robot's outline into the camera's picture by projecting the convex hulls of its shapes.
+
+    Depth and colour have their own errors at the robot's edge: everything grows by `margin_m` metres on
+    the robot and by `margin_px` pixels in the picture.
+    """
+
+    def __init__(
+        self,
+        kinematics: PandaKinematics,
+        intrinsics: Intrinsics,
+        margin_m: float = 0.001,
+        margin_px: float = 1.0,
+    ):
+        self._kinematics = kinematics
+        self._intrinsics = intrinsics
+        self._margin_m = margin_m
+        self._margin_px = margin_px
+        self._hulls = _visible_hulls(kinematics)
+
+    def mask(self, q: NDArray) -> NDArray[np.bool_]:
+        """True where the robot at joint angles q [7] is in the way, [H, W]."""
+        k = self._intrinsics
+        image = np.zeros(k.shape, np.uint8)
+        X_CW = np.linalg.inv(self._kinematics.X_WC(q))
+        X_CB: dict[RigidBody, NDArray] = {}
+        for hull in self._hulls:
+            if hull.body not in X_CB:
+                X_CB[hull.body] = X_CW @ self._kinematics.X_WA(q, hull.body.body_frame())
+            R, p = X_CB[hull.body][:3, :3], X_CB[hull.body][:3, 3]
+            corners = _ahead_of_camera(hull.corners @ R.T + p, hull.edges)
+            if corners is not None:
+                self._draw(image, corners)
+        return image.astype(bool)
+
+    def _draw(self, image: NDArray[np.uint8], p_CQ: NDArray) -> None:
+        """Fill the outline of points p_CQ [N, 3], all ahead of the camera."""
+        k = self._intrinsics
+        z = p_CQ[:, 2]
+        uv = np.stack([p_CQ[:, 0] / z * k.fx + k.cx, p_CQ[:, 1] / z * k.fy + k.cy], axis=-1)
+        margin = self._margin_px + self._margin_m * k.fx / z.min()
+        if (uv.max(axis=0) < -margin).any() or (
+            uv.min(axis=0) > (k.width + margin, k.height + margin)
+        ).any():
+            return
+        # Far outside the picture a coordinate would overflow; at that distance only its direction counts.
+        uv = np.clip(uv, -20 * k.width, 20 * k.width)
+        outline = cv2.convexHull(np.round(uv * (1 << _SUBPIXEL_BITS)).astype(np.int32))
+        cv2.fillConvexPoly(image, outline, 1, shift=_SUBPIXEL_BITS)
+        cv2.polylines(image, [outline], True, 1, round(2 * margin) + 1, shift=_SUBPIXEL_BITS)
+
+
+def _ahead_of_camera(p_CQ: NDArray, edges: NDArray) -> NDArray | None:
+    """The part of a convex body at z >= NEAR: its corners there and where its edges pierce that plane."""
+    z = p_CQ[:, 2]
+    if z.max() <= NEAR:
+        return None
+    if z.min() >= NEAR:
+        return p_CQ
+    crossing = edges[(z[edges[:, 0]] < NEAR) != (z[edges[:, 1]] < NEAR)]
+    start, end = p_CQ[crossing[:, 0]], p_CQ[crossing[:, 1]]
+    share = (NEAR - start[:, 2]) / (end[:, 2] - start[:, 2])
+    return np.concatenate([p_CQ[z >= NEAR], start + share[:, None] * (end - start)])
+
+
+def _visible_hulls(kinematics: PandaKinematics) -> list[_Hull]:
+    plant, inspector = kinematics.plant, kinematics.inspector
+    hulls = []
+    for instance in (kinematics.parts.arm, kinematics.parts.pusher):
+        for body_index in plant.GetBodyIndices(instance):
+            body = plant.get_body(body_index)
+            frame = plant.GetBodyFrameIdOrThrow(body_index)
+            for geometry in inspector.GetGeometries(frame, Role.kPerception):
+                points = _corners(inspector.GetShape(geometry))
+                hull = ConvexHull(points)
+                edges = np.concatenate([hull.simplices[:, [i, (i + 1) % 3]] for i in range(3)])
+                X_BG = inspector.GetPoseInFrame(geometry)
+                hulls.append(_Hull(body, (X_BG @ points.T).T, np.unique(np.sort(edges, axis=1), axis=0)))
+    return hulls
+
+
+def _corners(shape: Shape) -> NDArray[np.float64]:
+    """Points [N, 3] whose convex hull is a shape's, round ones taken as slightly larger polyhedra."""
+    if isinstance(shape, Mesh | Convex):
+        hull = shape.GetConvexHull()
+        return np.array([hull.vertex(i) for i in range(hull.num_vertices())])
+    if isinstance(shape, Box):
+        signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+        return signs * np.array(shape.size()) / 2
+    angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(24)], axis=-1) / np.cos(np.pi / 24)
+    up = np.array([0, 0, 1.0])
+    if isinstance(shape, Cylinder):
+        return np.concatenate([shape.radius() * circle + s * shape.length() / 2 * up for s in (-1, 1)])
+    if isinstance(shape, Sphere | Capsule):
+        half = shape.length() / 2 if isinstance(shape, Capsule) else 0.0
+        tilts = np.linspace(-np.pi / 2, np.pi / 2, 13)
+        return (
+            shape.radius()
+            * np.concatenate([circle * np.cos(t) + np.sin(t) / np.cos(np.pi / 24) * up for t in tilts])
+            + np.repeat(np.where(tilts < 0, -half, half), 24)[:, None] * up
+        )
+    raise ValueError(f"the robot's description has a visual {shape}; known are meshes and primitives")
