@@ -73,9 +73,7 @@ def group_body_frames(
     twists = _calc_bfifs(frames, above_0.depth_noise, focal_length, parameters)
     group, motions = _settled_groups(frames, twists, above_0.depth_noise, focal_length, parameters)
     seeds = frames.p_C0Q0[:, 0]
-    spans = [
-        flow_difference(seeds[group == g], X, np.eye(4), focal_length) for g, X in enumerate(motions)
-    ]
+    spans = [flow_difference(seeds[group == g], X, np.eye(4), focal_length) for g, X in enumerate(motions)]
     return BFIFGroups(
         pixel=frames.pixel,
         V_S=twists.V_S,

@@ -69,9 +69,7 @@ def carry_labels(
     return nearest_label(out, above_1, reach)
 
 
-def nearest_label(
-    label: NDArray[np.uint16], inside: NDArray[np.bool_], reach: float
-) -> NDArray[np.uint16]:
+def nearest_label(label: NDArray[np.uint16], inside: NDArray[np.bool_], reach: float) -> NDArray[np.uint16]:
     """Give each unlabelled pixel inside the label nearest to it, UNKNOWN beyond `reach` pixels.
 
     Objects that come into view, or are put there, must not become part of their neighbours.

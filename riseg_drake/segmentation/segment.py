@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import back_project, pixel_grid
-from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.geometry.rgbd import FramePair, Immutable
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.association import (
     UNKNOWN,
@@ -47,7 +47,7 @@ class SegmentParameters:
 
 
 @dataclass(frozen=True)
-class Segmentation:
+class Segmentation(Immutable):
     """L_t, and what must be remembered for L_t+1: the propagator's one state."""
 
     sequence: int
