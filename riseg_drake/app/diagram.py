@@ -17,7 +17,6 @@ from riseg_drake.pushing.push import ArmPhase
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.segmentation.segment import Segmentation
 from riseg_drake.stations.simulated import SimulatedStation, start_position
-from riseg_drake.stations.wrist_camera import CameraConfig
 from riseg_drake.systems.arm_motion import ArmMotion
 from riseg_drake.systems.push_planner import PushPlanner
 
@@ -93,7 +92,7 @@ def make_diagram(scenario: Scenario, seed: int, meshcat: Meshcat | None = None) 
         q_observe = np.array(start_position(config))
     except (ValueError, RuntimeError) as error:
         raise ScenarioError(" ".join(str(error).split())) from error
-    intrinsics = camera_intrinsics(config.camera)
+    intrinsics = config.camera.intrinsics
     kinematics = PandaKinematics(config.panda)
 
     builder = DiagramBuilder()
@@ -135,6 +134,3 @@ def make_diagram(scenario: Scenario, seed: int, meshcat: Meshcat | None = None) 
     return WiredDiagram(diagram, station, [*segmentation.stages, planner, arm], intrinsics)
 
 
-def camera_intrinsics(camera: CameraConfig) -> Intrinsics:
-    """The pinhole that the camera's configuration describes."""
-    return Intrinsics(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
