@@ -1,6 +1,7 @@
 """The command line, `riseg`: what can be asked for, and how it is said when something is wrong."""
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -28,6 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt as stop:
         print(f"riseg: stopped{f'; {stop}' if str(stop) else ''}", file=sys.stderr)
         return INTERRUPTED
+    except BrokenPipeError:  # whoever read our output has enough, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except Exception as error:
         if not isinstance(error, _mistakes()):
             raise
@@ -149,5 +152,6 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.app.scenario_file import ScenarioError
     from riseg_drake.evaluation.label_folders import LabelFolderError
     from riseg_drake.recording.layout import RecordingError
+    from riseg_drake.stations.scene import SceneError
 
-    return NoGraphicsError, OutputError, ScenarioError, LabelFolderError, RecordingError
+    return NoGraphicsError, OutputError, ScenarioError, SceneError, LabelFolderError, RecordingError

@@ -22,7 +22,7 @@ def diagram_command(scenario_file: Path | None, output: Path | None, console: Co
     require_graphics()
     dot = draw(make_diagram(scenario, seed=0).diagram)
     if output is None:
-        print(dot)
+        print(dot, flush=True)
         return
     content = _to_svg(dot) if output.suffix == ".svg" else dot.encode()
     try:

@@ -69,7 +69,11 @@ def interactions(
             yield book.close(wired.interaction_step(context), news.frame)  # line 10
             progress.interaction_step += 1  # line 9
         if news.phase is ArmPhase.DONE:
-            progress.end = "the arm is done: no push left, or as many made as were asked for"
+            made = wired.interaction_step(context)
+            enough = made >= wired.most_interactions
+            progress.end = (
+                f"{made} interactions were made" if enough else "no push is left that could find more"
+            )
         elif progress.time >= longest:
             progress.end = f"{longest:g} s were simulated"
 
