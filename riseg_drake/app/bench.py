@@ -29,7 +29,6 @@ REPETITIONS = 4
 WHOLE = "whole pair"
 
 
-
 StationOutputs = dict[str, Any]
 """What a station gave at one tick of the camera, by the names of the segmentation's inputs."""
 

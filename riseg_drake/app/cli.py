@@ -53,9 +53,7 @@ def _parser() -> argparse.ArgumentParser:
         "Writes pictures, masks and scores of every interaction to the output folder.",
     )
     _add_scenario(run)
-    run.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="draws the scene and the noise (0)"
-    )
+    run.add_argument("--seed", type=int, default=0, metavar="N", help="draws the scene and the noise (0)")
     run.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/SCENARIO_seed_N)")
     run.add_argument("--record", action="store_true", help="also write every frame to DIR/recording")
     run.add_argument(
@@ -84,9 +82,7 @@ def _parser() -> argparse.ArgumentParser:
         "The pairs are a rendered push, held in memory; nothing is written.",
     )
     _add_scenario(bench)
-    bench.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="draws the scene and the noise (0)"
-    )
+    bench.add_argument("--seed", type=int, default=0, metavar="N", help="draws the scene and the noise (0)")
 
     diagram = _add(
         commands,

@@ -129,9 +129,7 @@ def make_diagram(scenario: Scenario, seed: int, meshcat: Meshcat | None = None) 
     builder.Connect(arm.GetOutputPort("position"), planner.GetInputPort("position"))
     builder.Connect(arm.GetOutputPort("tried_pushes"), planner.GetInputPort("tried_pushes"))
     builder.Connect(planner.GetOutputPort("push"), arm.GetInputPort("push"))
-    builder.Connect(
-        station.GetOutputPort("panda.position_measured"), arm.GetInputPort("position_measured")
-    )
+    builder.Connect(station.GetOutputPort("panda.position_measured"), arm.GetInputPort("position_measured"))
     builder.Connect(arm.GetOutputPort("position"), station.GetInputPort("panda.position"))
     if meshcat is not None:
         view = builder.AddSystem(MeshcatView(meshcat, 1 / config.camera.rate))
@@ -150,5 +148,3 @@ def make_diagram(scenario: Scenario, seed: int, meshcat: Meshcat | None = None) 
     diagram = builder.Build()
     diagram.set_name("rt-RISeg")
     return WiredDiagram(diagram, station, [*segmentation.stages, planner, arm], scenario)
-
-
