@@ -1,6 +1,7 @@
 """What the algorithm sees at one moment: I_t with the kinematics that belong to it."""
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,8 +9,19 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.camera import Intrinsics
 
 
+class Immutable:
+    """Base of values that nobody changes once they are made, so that a copy may be the thing itself.
+
+    Drake copies the abstract state at every unrestricted update; images should not be copied with it.
+    """
+
+    def __deepcopy__(self, memo: dict) -> Self:
+        """The same value."""
+        return self
+
+
 @dataclass(frozen=True)
-class Frame:
+class Frame(Immutable):
     """The RGB-D image I_t, and what theta_t says of the same moment.
 
     Nobody writes into the arrays of a frame: several stages share them.
@@ -31,7 +43,7 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class FramePair:
+class FramePair(Immutable):
     """(I_t-1, I_t) with their kinematics; `reference` is the paper's t-1, `current` its t."""
 
     reference: Frame
@@ -41,6 +53,11 @@ class FramePair:
     def X_C1C0(self) -> NDArray[np.float64]:
         """The paper's camT_{t-1,t}: takes points of the camera at t-1 to the camera at t."""
         return np.linalg.inv(self.current.X_WC) @ self.reference.X_WC
+
+
+def unhidden_depth(frame: Frame) -> NDArray[np.float32]:
+    """The frame's depth [H, W], m, with 0 (invalid) where the robot is in the way."""
+    return np.where(frame.robot, np.float32(0), frame.depth)
 
 
 def sanitize_depth(depth: NDArray) -> NDArray[np.float32]:

@@ -1,1 +1,1 @@
-"""RGB-D recordings in the TUM layout, in and out, one frame at a time."""
+"""Floor 1: RGB-D folders in and out, in the layout of the TUM RGB-D data sets."""

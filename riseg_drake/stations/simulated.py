@@ -19,7 +19,6 @@ from pydrake.geometry import (
     RenderCameraCore,
     RenderEngineVtkParams,
     Rgba,
-    Role,
     RoleAssign,
     SceneGraph,
 )
@@ -41,7 +40,6 @@ from riseg_drake.robot.kinematics import PandaKinematics, observe_pose
 from riseg_drake.stations.scene import (
     PlacedObject,
     SceneConfig,
-    SceneError,
     add_scene,
     draw_scene,
     object_id_table,
@@ -49,6 +47,7 @@ from riseg_drake.stations.scene import (
 from riseg_drake.stations.wrist_camera import CameraConfig, ObjectLabels, WristCamera
 
 RENDERER = "renderer"
+CLIPPING = (0.01, 10.0)  # m; what the renderer draws, wider than what the sensor measures
 
 
 def soft_light() -> RenderEngineVtkParams:
@@ -147,7 +146,7 @@ class SimulatedStation(Diagram):
         self.set_name("station")
 
     def _wire_arm(self, builder: DiagramBuilder, arm: ModelInstanceIndex, step: float) -> None:
-        """Commands pass through with their rate of change as desired velocity, so that the arm does not lag."""
+        """Commands go in with their rate of change as desired velocity, so that the arm does not lag."""
         reference = builder.AddNamedSystem("reference", StateInterpolatorWithDiscreteDerivative(7, step))
         split = builder.AddNamedSystem("measured", Demultiplexer([7, 7]))
         builder.Connect(reference.get_output_port(), self.plant.get_desired_state_input_port(arm))
@@ -163,7 +162,7 @@ class SimulatedStation(Diagram):
         core = RenderCameraCore(
             RENDERER,
             CameraInfo(k.width, k.height, k.fx, k.fy, k.cx, k.cy),
-            ClippingRange(0.01, 10.0),
+            ClippingRange(*CLIPPING),
             RigidTransform(),
         )
         sensor = builder.AddNamedSystem(
@@ -172,10 +171,10 @@ class SimulatedStation(Diagram):
                 self.plant.GetBodyFrameIdOrThrow(frame.body().index()),
                 frame.GetFixedPoseInBodyFrame(),
                 ColorRenderCamera(core),
-                DepthRenderCamera(core, DepthRange(k.depth_min, k.depth_max)),
+                DepthRenderCamera(core, DepthRange(*CLIPPING)),
             ),
         )
-        # A quarter of a step after the plant's own: joint angles read within the millisecond that follows
+        # A quarter of a step after the plant's own: joint angles read within the millisecond after that
         # are those of the picture.
         camera = builder.AddNamedSystem("wrist_camera", WristCamera(k, seed, 1 / k.rate, step / 4))
         labels = builder.AddNamedSystem("labels", ObjectLabels(k, object_id_table(self.object_bodies)))
@@ -201,8 +200,8 @@ def start_position(config: SimulatedStationConfig) -> list[float]:
     )
     if q is None:
         raise ValueError(
-            f"observe_height: no posture looks at {config.scene.centre_W} from {config.observe_height} m; "
-            "0.5 m above (0.5, 0) is within reach"
+            f"observe_height: no posture looks at {config.scene.centre_W} from {config.observe_height} "
+            "m; 0.5 m above (0.5, 0) is within reach"
         )
     return list(q)
 

@@ -16,6 +16,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
+
 from riseg_drake.stations.footprint import Footprint, separation, travel
 from riseg_drake.stations.object_models import find_models
 from riseg_drake.stations.scene import (
@@ -28,7 +29,9 @@ from riseg_drake.stations.scene import (
 )
 
 SEEDS = range(6)
-INERTIAL = "<inertial><mass>0.1</mass><inertia><ixx>6e-5</ixx><iyy>6e-5</iyy><izz>7e-5</izz></inertia></inertial>"
+INERTIAL = (
+    "<inertial><mass>0.1</mass><inertia><ixx>6e-5</ixx><iyy>6e-5</iyy><izz>7e-5</izz></inertia></inertial>"
+)
 
 
 def sdf(geometry: str, pose: str = "0 0 0 0 0 0", more: str = "") -> str:
@@ -79,13 +82,14 @@ def scenes() -> list[list[PlacedObject]]:
 
 def test_a_shape_travels_until_its_corner_meets_an_edge():
     square = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])
-    left, right = Footprint((square,), 0.0), Footprint((square + (3.0, 0.5),), 0.0)
+    left = Footprint((square,), 0.0)
+    right = left.moved(0.0, np.array([3.0, 0.5]))
     assert travel(left, right, np.array([1.0, 0.0])) == pytest.approx(2.0)
     assert travel(right, left, np.array([-1.0, 0.0])) == pytest.approx(2.0)
     assert travel(left, right, np.array([0.0, 1.0])) == np.inf
     assert separation(left, right) == pytest.approx(2.0)
-    assert separation(left, Footprint((square + (1.3, 1.4),), 0.0)) == pytest.approx(0.5)
-    assert separation(left, Footprint((square + 0.9,), 0.0)) == 0.0
+    assert separation(left, left.moved(0.0, np.array([1.3, 1.4]))) == pytest.approx(0.5)
+    assert separation(left, left.moved(0.0, np.array([0.9, 0.9]))) == 0.0
 
 
 @pytest.mark.renders
@@ -150,7 +154,7 @@ def test_a_folder_of_plain_models_makes_a_scene(tmp_path):
         "can": 0.025,
         "dice": 0.025,
     }.items():
-        # On its added feet a box stands a third of a millimetre high; without them it sinks into the table.
+        # On its added feet a box stands 0.3 mm high; without them it sinks into the table.
         assert height[name] == pytest.approx(half, abs=5e-4)
 
 

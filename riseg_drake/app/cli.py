@@ -1,0 +1,153 @@
+"""The command line, `riseg`: what can be asked for, and how it is said when something is wrong."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from rich.console import Console
+
+BAD_INPUT = 2
+INTERRUPTED = 130  # 128 + SIGINT, as shells have it
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; returns its exit code: 0 done, 2 bad input, 130 interrupted."""
+    chosen = _parser().parse_args(arguments)
+    try:
+        # Commands are imported when called: `riseg --help` shall not wait for Drake.
+        chosen.call(chosen, Console())
+    except KeyboardInterrupt as stop:
+        print(f"riseg: stopped{f'; {stop}' if str(stop) else ''}", file=sys.stderr)
+        return INTERRUPTED
+    except Exception as error:
+        if not isinstance(error, _mistakes()):
+            raise
+        print(f"riseg: {error}", file=sys.stderr)
+        return BAD_INPUT
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="riseg", description="Find the objects on a table by nudging them (rt-RISeg in Drake)."
+    )
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    run = _add(
+        commands,
+        "run",
+        _run,
+        "Nudge the objects of one simulated scene until each is found, and score the masks.\n"
+        "Writes pictures, masks and scores of every interaction to the output folder.",
+    )
+    _add_scenario(run)
+    run.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="draws the scene and the noise (0)"
+    )
+    run.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/SCENARIO_seed_N)")
+    run.add_argument("--record", action="store_true", help="also write every frame to DIR/recording")
+    run.add_argument(
+        "--meshcat",
+        action=argparse.BooleanOptionalAction,
+        default=False,
+        help="show it in the browser and save the replay as DIR/replay.html (no)",
+    )
+
+    score = _add(
+        commands,
+        "score",
+        _score,
+        "Compare two folders of label PNGs with equal names, image by image.\n"
+        "Prints the ten figures of the field's protocol, as means over the images.",
+    )
+    score.add_argument("predicted", type=Path, metavar="PREDICTED", help="folder of predicted masks")
+    score.add_argument("true", type=Path, metavar="TRUE", help="folder of true masks")
+    score.add_argument("--json", type=Path, metavar="FILE", help="also write all figures, per image too")
+
+    bench = _add(
+        commands,
+        "bench",
+        _bench,
+        "Measure time and memory of every stage of the segmentation for a 640x480 image pair.\n"
+        "The pairs are a rendered push, held in memory; nothing is written.",
+    )
+    _add_scenario(bench)
+    bench.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="draws the scene and the noise (0)"
+    )
+
+    diagram = _add(
+        commands,
+        "diagram",
+        _diagram,
+        "Draw the wired diagram of a scenario, as DOT or (with graphviz installed) as SVG.\n"
+        "Without an output file the DOT text goes to the terminal.",
+    )
+    _add_scenario(diagram)
+    diagram.add_argument("--output", type=Path, metavar="FILE", help="a file that ends in .dot or .svg")
+    return parser
+
+
+def _add(commands, name, call, explanation) -> argparse.ArgumentParser:  # type: ignore[no-untyped-def]
+    command = commands.add_parser(
+        name,
+        help=explanation.splitlines()[0],
+        description=explanation,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    command.set_defaults(call=call)
+    return command
+
+
+def _add_scenario(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "scenario",
+        type=Path,
+        nargs="?",
+        metavar="SCENARIO",
+        help="a YAML file (the built-in simulation)",
+    )
+
+
+def _run(chosen: argparse.Namespace, console: Console) -> None:
+    from riseg_drake.app.run import run_command
+
+    run_command(chosen.scenario, chosen.seed, chosen.output, chosen.record, chosen.meshcat, console)
+
+
+def _score(chosen: argparse.Namespace, console: Console) -> None:
+    from riseg_drake.app.score_command import score_command
+
+    score_command(chosen.predicted, chosen.true, chosen.json, console)
+
+
+def _bench(chosen: argparse.Namespace, console: Console) -> None:
+    from riseg_drake.app.bench import bench_command
+
+    bench_command(chosen.scenario, chosen.seed, console)
+
+
+def _diagram(chosen: argparse.Namespace, console: Console) -> None:
+    from riseg_drake.app.drawing import diagram_command
+
+    diagram_command(chosen.scenario, chosen.output, console)
+
+
+def _mistakes() -> tuple[type[Exception], ...]:
+    """The errors that tell a person what to do otherwise; any other is a fault of this program."""
+    from riseg_drake.app.graphics import NoGraphicsError
+    from riseg_drake.app.output import OutputError
+    from riseg_drake.app.scenario_file import ScenarioError
+    from riseg_drake.evaluation.label_folders import LabelFolderError
+    from riseg_drake.recording.layout import RecordingError
+
+    return NoGraphicsError, OutputError, ScenarioError, LabelFolderError, RecordingError

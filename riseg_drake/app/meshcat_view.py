@@ -1,0 +1,121 @@
+"""What a person sees in the browser beside the robot and the scene: the push to come, and the objects found.
+
+Drake's own MeshcatVisualizer shows robot and scene. A Meshcat recording keeps motions and properties but
+not changing shapes, so what changes shape is drawn once a step under a name of its own, and the
+recording keeps when it is visible.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.value import AbstractValue, Value
+from pydrake.geometry import Cylinder, Meshcat, MeshcatCone, Rgba
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.perception import BaseField, Fields, PointCloud
+from pydrake.systems.framework import Context, EventStatus, LeafSystem
+
+from riseg_drake.app.overlay import object_colors
+from riseg_drake.geometry.camera import back_project
+from riseg_drake.geometry.rgbd import Frame, FramePair
+from riseg_drake.pushing.push import ArmPhase, Push
+
+POINT_STRIDE = 3
+"""Every third pixel in both directions becomes a point: 34 thousand at 640x480."""
+POINT_SIZE = 0.0025  # m
+ARROW_RADIUS = 0.004  # m
+ARROW_RUN_UP = 0.08
+"""How far ahead of the contact the arrow begins, m."""
+ARROW_COLOR = Rgba(0.84, 0.37, 0.0, 1.0)
+
+
+class MeshcatView(LeafSystem):
+    """Draws the point cloud coloured by object id, and the planned push as an arrow.
+
+    Inputs: `pair` (FramePair), `mask` (uint16 [H, W]), `push` (Push or None), `phase` (ArmPhase, step).
+    """
+
+    def __init__(self, meshcat: Meshcat, period: float):
+        super().__init__()
+        self.set_name("MeshcatView")
+        self._meshcat = meshcat
+        self._shown_push: object = None
+        self._paths: dict[str, str] = {}  # by kind ("points", "push"), what is visible now
+        self._sequence = -1
+        for name in ("pair", "mask", "push", "phase"):
+            self.DeclareAbstractInputPort(name, _any_value())
+        self.DeclarePeriodicPublishEvent(period, 0.0, self._publish)
+
+    def _publish(self, context: Context) -> EventStatus:
+        pair: FramePair | None = self.GetInputPort("pair").Eval(context)
+        phase, interaction_step = self.GetInputPort("phase").Eval(context)
+        time = context.get_time()
+        if pair is not None and pair.current.sequence != self._sequence:
+            self._sequence = pair.current.sequence
+            mask = self.GetInputPort("mask").Eval(context)
+            self._show_points(pair.current, mask, interaction_step, time)
+        # The push is looked at only once it is under way: to look is to plan.
+        push = self.GetInputPort("push").Eval(context) if phase in _MOVING else None
+        self._show_push(push, interaction_step, time)
+        return EventStatus.Succeeded()
+
+    def _show_points(self, frame: Frame, mask: NDArray, interaction_step: int, time: float) -> None:
+        path = f"/riseg/points/step_{interaction_step}"
+        self._meshcat.SetObject(path, object_cloud(frame, mask), POINT_SIZE)
+        self._turn_to("points", path, time)
+
+    def _show_push(self, push: Push | None, interaction_step: int, time: float) -> None:
+        if push is self._shown_push:
+            return
+        self._shown_push = push
+        path = f"/riseg/push/step_{interaction_step}"
+        if push is not None:
+            draw_arrow(self._meshcat, path, push)
+        self._turn_to("push", path if push is not None else "", time)
+
+    def _turn_to(self, kind: str, path: str, time: float) -> None:
+        """Make one path of a kind visible, and the one that was so until now invisible."""
+        before = self._paths.get(kind, "")
+        if path == before:
+            return
+        if before:
+            self._meshcat.SetProperty(before, "visible", False, time)
+        if path:
+            self._meshcat.SetProperty(path, "visible", False, 0.0)  # in the replay: not from the beginning
+            self._meshcat.SetProperty(path, "visible", True, time)
+        self._paths[kind] = path
+
+
+_MOVING = (ArmPhase.APPROACH, ArmPhase.PUSH)
+
+
+def object_cloud(frame: Frame, mask: NDArray) -> PointCloud:
+    """The frame's points in W: objects in the colours of their ids, all else as the camera saw it."""
+    stride = (slice(None, None, POINT_STRIDE), slice(None, None, POINT_STRIDE))
+    p_CQ = back_project(frame.depth, frame.intrinsics)[stride].reshape(-1, 3)
+    ids = mask[stride].ravel()
+    colors = np.where(ids[:, None] > 0, object_colors(ids), frame.color[stride].reshape(-1, 3))
+    seen = (p_CQ[:, 2] > 0) & ~frame.robot[stride].ravel()
+    p_WQ = p_CQ[seen] @ frame.X_WC[:3, :3].T + frame.X_WC[:3, 3]
+
+    cloud = PointCloud(int(seen.sum()), Fields(BaseField.kXYZs | BaseField.kRGBs))
+    cloud.mutable_xyzs()[:] = p_WQ.T
+    cloud.mutable_rgbs()[:] = colors[seen].T
+    return cloud
+
+
+def draw_arrow(meshcat: Meshcat, path: str, push: Push) -> None:
+    """An arrow through the contact, along the push, to where the contact will be at its end."""
+    direction_W = np.array([*push.direction_W, 0.0])
+    tail, tip = push.p_WB - ARROW_RUN_UP * direction_W, push.p_WB + push.d_push * direction_W
+    head = 4 * ARROW_RADIUS
+    shaft = float(np.linalg.norm(tip - tail)) - head
+    # The cylinder lies about its middle; the cone's point is its origin and it opens along its z axis.
+    along = RotationMatrix.MakeFromOneVector(direction_W, 2)
+    against = RotationMatrix.MakeFromOneVector(-direction_W, 2)
+    meshcat.SetObject(f"{path}/shaft", Cylinder(ARROW_RADIUS, shaft), ARROW_COLOR)
+    meshcat.SetTransform(f"{path}/shaft", RigidTransform(along, tail + shaft / 2 * direction_W))
+    meshcat.SetObject(f"{path}/head", MeshcatCone(head, head / 2, head / 2), ARROW_COLOR)
+    meshcat.SetTransform(f"{path}/head", RigidTransform(against, tip))
+
+
+def _any_value() -> AbstractValue:
+    return Value[object]()

@@ -1,0 +1,183 @@
+"""The folder a run leaves behind: pictures and masks of every step, and a summary of them all.
+
+    summary.json
+    step_0/ color.png  depth.png  mask.png  overlay.png  ground_truth.png
+    step_1/ ...
+
+Whenever the run is stopped, every step that the summary lists is there, and whole.
+"""
+
+import json
+import math
+import re
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.app.overlay import draw_overlay
+from riseg_drake.evaluation.scores import Scores
+from riseg_drake.recording.whole_file import write_png, write_text
+from riseg_drake.recording.writer import depth_to_millimetres
+
+SUMMARY = "summary.json"
+RECORDING = "recording"
+REPLAY = "replay.html"
+
+
+class OutputError(ValueError):
+    """Why nothing can be written to an output folder, in one line."""
+
+
+@dataclass(frozen=True)
+class ObjectMotion:
+    """What one interaction did to one object."""
+
+    moved_m: float
+    """Distance between the object's origin before and after, m."""
+    tilted_deg: float
+    """Angle by which the object leans further than before, degrees."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """What is known after interaction i, L*_t above all; step 0 is before any interaction."""
+
+    interaction_step: int
+    time: float
+    """Of the frame, s since the start."""
+    color: NDArray[np.uint8]
+    """[H, W, 3], RGB."""
+    depth: NDArray[np.float32]
+    """[H, W], metres, 0 = invalid."""
+    mask: NDArray[np.uint16]
+    """L*_t [H, W], 0 = background."""
+    frames: int
+    """Camera frames since the last step."""
+    stage_seconds: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    """Wall time of every call since the last step, by stage, s."""
+    ground_truth: NDArray[np.uint16] | None = None
+    """[H, W], visible pixels of each object; only in simulation."""
+    scores: Scores | None = None
+    motions: Mapping[str, ObjectMotion] = field(default_factory=dict)
+    """By object, since the last step; only in simulation."""
+
+    @property
+    def objects(self) -> int:
+        """How many objects the mask shows."""
+        return len(np.unique(self.mask[self.mask > 0]))
+
+
+class RunFolder:
+    """Writes the steps of one run. What an earlier run left in the folder is removed first.
+
+    Raises OutputError if the folder holds anything else than an earlier run.
+    """
+
+    def __init__(self, folder: Path, about: Mapping[str, Any]):
+        self.path = folder
+        self._summary: dict[str, Any] = {**about, "state": "running", "steps": []}
+        if folder.exists() and not folder.is_dir():
+            raise OutputError(f"{folder} is a file; give a folder for the output")
+        if folder.is_dir() and any(folder.iterdir()) and not (folder / SUMMARY).exists():
+            raise OutputError(
+                f"{folder} is not empty and holds no earlier run; give a new folder, or an empty one"
+            )
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._remove_earlier_run()
+            self._write_summary()
+        except OSError as error:
+            raise OutputError(f"cannot write to {folder}: {error.strerror}") from None
+
+    def write_step(self, step: Step) -> None:
+        """Write one step's pictures, then enter it in the summary."""
+        name = f"step_{step.interaction_step}"
+        unfinished = self.path / f".{name}.unfinished"
+        unfinished.mkdir()
+        write_png(unfinished / "color.png", step.color)
+        write_png(unfinished / "depth.png", depth_to_millimetres(step.depth))
+        write_png(unfinished / "mask.png", step.mask.astype(np.uint16))
+        write_png(unfinished / "overlay.png", draw_overlay(step.color, step.mask))
+        if step.ground_truth is not None:
+            write_png(unfinished / "ground_truth.png", step.ground_truth.astype(np.uint16))
+        unfinished.rename(self.path / name)
+        self._summary["steps"].append(_step_to_json(step))
+        self._write_summary()
+
+    def finish(self, state: str, **figures: Any) -> None:
+        """Enter how the run ended and figures of the whole run."""
+        self._summary.update(state=state, **figures)
+        self._write_summary()
+
+    def _write_summary(self) -> None:
+        write_text(self.path / SUMMARY, to_json(self._summary))
+
+    def _remove_earlier_run(self) -> None:
+        # The summary goes first: what it lists must be there at any moment.
+        (self.path / SUMMARY).unlink(missing_ok=True)
+        (self.path / REPLAY).unlink(missing_ok=True)
+        for entry in self.path.iterdir():
+            if re.fullmatch(rf"\.?step_\d+(\.unfinished)?|{RECORDING}", entry.name) and entry.is_dir():
+                shutil.rmtree(entry)
+
+
+def to_json(content: Any) -> str:
+    """JSON text; NaN and infinity, which JSON does not have, become null."""
+    return json.dumps(_finite(content), indent=2) + "\n"
+
+
+def stage_figures(seconds: Mapping[str, Sequence[float]]) -> dict[str, dict[str, float]]:
+    """Calls, median and 95th percentile in milliseconds of every stage that was called."""
+    return {
+        stage: {
+            "calls": len(times),
+            "median_ms": round(float(np.median(times)) * 1e3, 3),
+            "p95_ms": round(float(np.percentile(times, 95)) * 1e3, 3),
+        }
+        for stage, times in seconds.items()
+        if len(times)
+    }
+
+
+def motion_between(
+    before: Mapping[str, NDArray], after: Mapping[str, NDArray]
+) -> dict[str, ObjectMotion]:
+    """How far every object moved and tilted between two sets of poses X_WB [4, 4], by its name."""
+    motions = {}
+    for name, X_WB1 in after.items():
+        X_WB0 = before[name]
+        R_up = X_WB1[:3, :3] @ X_WB0[:3, :3].T  # turns the object's old attitude into the new one
+        tilt = math.acos(min(1.0, max(-1.0, R_up[2, 2])))
+        moved = float(np.linalg.norm(X_WB1[:3, 3] - X_WB0[:3, 3]))
+        motions[name] = ObjectMotion(moved, math.degrees(tilt))
+    return motions
+
+
+def _step_to_json(step: Step) -> dict[str, Any]:
+    content: dict[str, Any] = {
+        "step": step.interaction_step,
+        "time_s": round(step.time, 6),
+        "frames": step.frames,
+        "objects": step.objects,
+        "stages": stage_figures(step.stage_seconds),
+    }
+    if step.scores is not None:
+        content["scores"] = step.scores.as_dict()
+    if step.motions:
+        content["motions"] = {name: asdict(motion) for name, motion in step.motions.items()}
+    return content
+
+
+def _finite(content: Any) -> Any:
+    if isinstance(content, Mapping):
+        return {key: _finite(value) for key, value in content.items()}
+    if isinstance(content, list | tuple):
+        return [_finite(value) for value in content]
+    if isinstance(content, float) and not math.isfinite(content):
+        return None
+    return content

@@ -1,0 +1,32 @@
+"""`riseg score`: two folders of label images, ten figures."""
+
+from pathlib import Path
+
+from rich.console import Console
+
+from riseg_drake.app.output import OutputError, to_json
+from riseg_drake.app.tables import score_table
+from riseg_drake.evaluation.label_folders import score_folders
+from riseg_drake.evaluation.scores import mean_scores
+from riseg_drake.recording.whole_file import write_text
+
+MOST_ROWS = 20
+"""More images than this are not listed one by one on the terminal."""
+
+
+def score_command(predicted: Path, true: Path, json_file: Path | None, console: Console) -> None:
+    """Print the mean figures of two folders; write them, and those of every image, to a JSON file."""
+    images = dict(score_folders(predicted, true))
+    mean = mean_scores(list(images.values()))
+    if json_file is not None:
+        content = {
+            "scores": mean.as_dict(),
+            "images": {name: scores.as_dict() for name, scores in images.items()},
+        }
+        try:
+            write_text(json_file, to_json(content))
+        except OSError as error:
+            raise OutputError(f"cannot write {json_file}: {error.strerror}") from None
+    rows = [*images.items(), ("mean", mean)] if len(images) <= MOST_ROWS else [("mean", mean)]
+    console.print(f"{len(images)} image{'s' if len(images) > 1 else ''}, figures in percent")
+    console.print(score_table(rows, first="\nimage"))

@@ -1,0 +1,45 @@
+"""Figures as tables on the terminal."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from rich import box
+from rich.table import Table
+
+from riseg_drake.evaluation.scores import Scores
+
+
+def score_table(rows: Iterable[tuple[str, Scores]], first: str) -> Table:
+    """One row a name, in percent like the paper's table; an object with Overlap F above 75 % is found."""
+    table = Table(box=box.SIMPLE, padding=(0, 1, 0, 0))
+    table.add_column(first, justify="left", no_wrap=True)
+    for column in ("Overlap\nP", "\nR", "\nF", "Boundary\nP", "\nR", "\nF", "found\n%", "\nobjects"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for name, scores in rows:
+        shares = (
+            scores.overlap_precision,
+            scores.overlap_recall,
+            scores.overlap_f,
+            scores.boundary_precision,
+            scores.boundary_recall,
+            scores.boundary_f,
+            scores.found_share,
+        )
+        objects = f"{scores.objects_found:g} of {scores.objects_true:g}"
+        table.add_row(name, *(f"{100 * share:.1f}" for share in shares), objects)
+    return table
+
+
+def stage_table(stages: Mapping[str, Mapping[str, float]], title: str) -> Table:
+    """One row a stage: calls, median and 95th percentile in milliseconds, and memory where measured."""
+    with_memory = any("peak_mb" in figures for figures in stages.values())
+    table = Table(box=box.SIMPLE, title=title, title_justify="left")
+    table.add_column("stage", justify="left")
+    columns: Sequence[str] = ("calls", "median ms", "p95 ms") + (("peak MB",) if with_memory else ())
+    for column in columns:
+        table.add_column(column, justify="right")
+    for stage, figures in stages.items():
+        cells = [f"{figures['calls']:.0f}", f"{figures['median_ms']:.1f}", f"{figures['p95_ms']:.1f}"]
+        if with_memory:
+            cells.append(f"{figures['peak_mb']:.1f}" if "peak_mb" in figures else "")
+        table.add_row(stage, *cells)
+    return table

@@ -1,0 +1,92 @@
+"""Where the bar touches a cluster, how low it must be there, and what else it would sweep through.
+
+The paper pushes at a boundary point. A bar has a width: coming along bc it touches the cluster first
+wherever the outline protrudes most within that width.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.pushing.pusher import Pusher
+from riseg_drake.pushing.table_map import TableMap
+from riseg_drake.pushing.validity import ValidityParameters, rectangle
+
+SKIN = 0.006
+"""Depth, m, behind the first contact over which an object's height there is measured."""
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Of N candidates: the contact, and whether the way to it and through the push is clear."""
+
+    b_W: NDArray[np.float64]
+    """[N, 2], the middle of the bar's face when it touches, on the line through boundary point and c."""
+    height: NDArray[np.float64]
+    """[N], how high the object is where it is touched, m; 0 where the bar misses."""
+    tip_height: NDArray[np.float64]
+    """[N], height of the bar's end face above the table, m."""
+    high_enough: NDArray[np.bool_]
+    """[N], the bar touches, and need not come closer to the table than it may."""
+    only_target: NDArray[np.bool_]
+    """[N], up to the contact the bar meets nothing, and from there on no segmented object."""
+    beside_target: NDArray[np.float64]
+    """[N], share of what the bar's face moves through that is unsegmented but not of the cluster."""
+    unseen: NDArray[np.float64]
+    """[N], share of the way to the contact that the camera could not see."""
+
+
+def find_contacts(
+    boundary_W: NDArray,
+    direction_W: NDArray,
+    cluster: NDArray[np.bool_],
+    table: TableMap,
+    pusher: Pusher,
+    parameters: ValidityParameters,
+) -> Contacts:
+    """The contacts of pushes through N boundary points [N, 2] along unit directions [N, 2].
+
+    Parts of the cluster that the bar's end face passes over at its lowest do not count as contact.
+    """
+    lowest_object = pusher.lowest_tip_height / pusher.height_share
+    reach = max(pusher.width, parameters.d_push)
+    along = np.arange(-reach, reach, table.cell)
+    across = np.linspace(
+        -pusher.width / 2, pusher.width / 2, int(np.ceil(pusher.width / table.cell)) + 1
+    )
+    swath = rectangle(boundary_W, direction_W, along, across)
+    height = np.where(table.lookup(cluster, swath), table.lookup(table.height, swath), 0.0)
+    profile = height.max(axis=2)  # [N, S]
+    touching = profile >= lowest_object
+    touched = touching.any(axis=1)
+    first = np.where(touched, np.argmax(touching, axis=1), 0)
+    # The face meets the near edge of the first cell, half a cell before its centre.
+    travel = along[first] - table.cell / 2
+    skin = np.arange(len(along))[None] - first[:, None]
+    skin_height = np.where((skin >= 0) & (skin * table.cell <= SKIN), profile, 0.0).max(axis=1)
+    skin_height[~touched] = 0.0
+    b_W = boundary_W + travel[:, None] * direction_W
+
+    margin = pusher.margin / 2
+    across = np.linspace(
+        -pusher.width / 2 - margin,
+        pusher.width / 2 + margin,
+        int(np.ceil((pusher.width + 2 * margin) / table.cell)) + 1,
+    )
+    gap = rectangle(b_W, direction_W, np.arange(-parameters.clearance, 0.0, table.cell), across)
+    stroke = rectangle(b_W, direction_W, np.arange(0.0, parameters.d_push, table.cell), across)
+    strangers = table.objects & ~cluster
+    known = strangers & table.segmented
+    in_gap = table.lookup(strangers, gap).any(axis=(1, 2))
+    in_stroke = table.lookup(known, stroke).any(axis=(1, 2))
+    tip_height = np.minimum(pusher.tip_height, pusher.height_share * skin_height)
+    return Contacts(
+        b_W=b_W,
+        height=skin_height,
+        tip_height=np.maximum(tip_height, pusher.lowest_tip_height),
+        high_enough=touched & (skin_height >= lowest_object),
+        only_target=~in_gap & ~in_stroke,
+        beside_target=table.lookup(strangers & ~table.segmented, stroke).mean(axis=(1, 2)),
+        unseen=1.0 - table.lookup(table.seen, gap).mean(axis=(1, 2)),
+    )

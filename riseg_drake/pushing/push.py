@@ -1,0 +1,66 @@
+"""The paper's action a_i: one push, and the memory of pushes already tried."""
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from riseg_drake.pushing.push_path import PushPath
+
+
+class ArmPhase(Enum):
+    """What the arm is doing."""
+
+    OBSERVE = "observe"
+    """At rest at the observation posture."""
+    APPROACH = "approach"
+    """From there to where the pusher is lowered behind the object."""
+    PUSH = "push"
+    """Forward: up to the contact and d_push beyond it."""
+    RETREAT = "retreat"
+    """Back a little, up, and to the observation posture."""
+    DONE = "done"
+    """At rest for good: there is nothing more to push."""
+
+
+@dataclass(frozen=True)
+class Push:
+    """a_i = (b, bc, d_push), as the robot will do it."""
+
+    p_WE: NDArray[np.float64]
+    """[3], where the tip E is lowered to, `clearance` (and half the bar) behind the contact, m."""
+    tip_height: float
+    """Height of the tip above the table during the push, m."""
+    direction_W: NDArray[np.float64]
+    """[2], unit vector bc on the table."""
+    p_WB: NDArray[np.float64]
+    """[3], the contact b on the bar's face, m; an arrow goes from here along the direction."""
+    length: float
+    """How far E travels forward, m: the clearance and d_push."""
+    d_push: float
+    """How far beyond the contact, m."""
+    center_W: NDArray[np.float64]
+    """[2], the center c of the cluster that is pushed, m."""
+    cluster_W: NDArray[np.float64]
+    """[M, 2], the cluster's points P, m."""
+    tallest: float
+    """Height of the tallest object on the table, m: the pusher crosses above it."""
+    cost: float
+    """What the ranking says, less is better."""
+    path: "PushPath | None" = field(default=None, repr=False)
+    """The arm's way there and back; None until it has been planned."""
+
+
+@dataclass(frozen=True)
+class TriedPush:
+    """A push that was made, and whether it brought anything."""
+
+    p_WB: NDArray[np.float64]
+    """[3], its contact, m."""
+    direction_W: NDArray[np.float64]
+    """[2], its direction."""
+    changed: bool
+    """Whether the segmented area or the number of objects grew."""

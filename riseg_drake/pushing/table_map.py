@@ -1,0 +1,148 @@
+"""The table seen from straight above: the paper's masks on a metric grid instead of in the image.
+
+Alg. 3 cuts, shifts and intersects masks. In the image a shift of 2 cm has another length in every
+pixel, and a tall object covers table that is free. On this map a length is a length wherever it lies,
+and the outline of an object is what a vertical pusher meets. Cells are indexed [i, j], i along W's y
+and j along W's x; points on the table are p_WQ = (x, y) in metres.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.camera import Intrinsics, rays
+
+
+@dataclass
+class TableMapParameters:
+    """Where the map lies and how fine it is."""
+
+    work_area_W: list[float] = field(default_factory=lambda: [0.25, 0.75, -0.28, 0.28])
+    """[x_min, x_max, y_min, y_max], m: the part of the table that objects must not leave."""
+    surround: float = 0.08
+    """What the map shows around the work area, m: the pusher may start outside of it."""
+    cell: float = 0.002
+    """Edge of a cell, m; enlarged where the pixels are coarser than that."""
+
+
+@dataclass(frozen=True)
+class TableMap:
+    """The scene on a grid over the table."""
+
+    origin_W: NDArray[np.float64]
+    """(x, y) of the centre of cell [0, 0], m."""
+    cell: float
+    """Edge of a cell, m."""
+    objects: NDArray[np.bool_]
+    """The paper's objMask: cells with something above the table."""
+    segmented: NDArray[np.bool_]
+    """The paper's binL: cells whose highest point has an object id in L_t."""
+    height: NDArray[np.float32]
+    """Height of the highest point seen in a cell above the table, m; 0 where there is no object."""
+    seen: NDArray[np.bool_]
+    """Cells of which the camera saw anything; the others lie in a shadow or outside of the view."""
+    work_area_W: tuple[float, float, float, float]
+    """(x_min, x_max, y_min, y_max), m."""
+    plane_W: NDArray[np.float64] = field(default_factory=lambda: np.array([0.0, 0.0, 1.0, 0.0]))
+    """The table top, [n, d] with n . p_WQ + d the height of Q above it."""
+
+    @property
+    def cell_area(self) -> float:
+        """Area of a cell, m^2."""
+        return self.cell**2
+
+    def points(self, mask: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """p_WQ [N, 2] of the centres of the cells in a mask, row by row."""
+        i, j = np.nonzero(mask)
+        return self.origin_W + self.cell * np.column_stack([j, i])
+
+    def lookup(self, values: NDArray, p_WQ: NDArray) -> NDArray:
+        """What an array of the map holds at points p_WQ [..., 2]; 0 or False outside of the map."""
+        index = np.rint((p_WQ - self.origin_W) / self.cell).astype(int)
+        j, i = index[..., 0], index[..., 1]
+        inside = (i >= 0) & (i < values.shape[0]) & (j >= 0) & (j < values.shape[1])
+        found = values[np.where(inside, i, 0), np.where(inside, j, 0)]
+        return np.where(inside, found, np.zeros((), values.dtype))
+
+    def ground(self, p_WQ: NDArray) -> NDArray[np.float64]:
+        """z in W of the table top below points p_WQ [..., 2], m."""
+        n_xy, n_z, d = self.plane_W[:2], self.plane_W[2], self.plane_W[3]
+        return -(p_WQ @ n_xy + d) / n_z
+
+    def in_work_area(self, p_WQ: NDArray) -> NDArray[np.bool_]:
+        """Which points p_WQ [..., 2] lie in the work area."""
+        x_min, x_max, y_min, y_max = self.work_area_W
+        x, y = p_WQ[..., 0], p_WQ[..., 1]
+        return (x >= x_min) & (x <= x_max) & (y >= y_min) & (y <= y_max)
+
+
+def map_table(
+    depth: NDArray,
+    intrinsics: Intrinsics,
+    X_WC: NDArray,
+    objects: NDArray[np.bool_],
+    height: NDArray,
+    mask: NDArray,
+    plane_W: NDArray,
+    robot: NDArray[np.bool_] | None = None,
+    parameters: TableMapParameters | None = None,
+) -> TableMap:
+    """The map of what one image shows.
+
+    Args:
+        depth: [H, W], metres, 0 = invalid.
+        intrinsics: of the camera.
+        X_WC: [4, 4], pose of the camera.
+        objects: [H, W], pixels above the table (objMask in the image).
+        height: [H, W], height of each pixel's point above the table, m.
+        mask: [H, W], L_t, the object id of each pixel, 0 = none yet.
+        plane_W: [4], the table top.
+        robot: [H, W], pixels to leave out because the robot covers them.
+        parameters: the defaults if None.
+    """
+    parameters = parameters or TableMapParameters()
+    valid = depth > 0 if robot is None else (depth > 0) & ~robot
+    pixels = np.flatnonzero(valid)
+    if len(pixels):
+        pixel_size = 1.5 * float(np.median(depth.reshape(-1)[pixels])) / min(intrinsics.fx, intrinsics.fy)
+    else:
+        pixel_size = 0.0
+    cell = max(parameters.cell, pixel_size)
+    x_min, x_max, y_min, y_max = parameters.work_area_W
+    origin_W = np.array([x_min, y_min]) - parameters.surround
+    columns = int(np.ceil((x_max - x_min + 2 * parameters.surround) / cell)) + 1
+    rows = int(np.ceil((y_max - y_min + 2 * parameters.surround) / cell)) + 1
+
+    ray = rays(intrinsics).reshape(-1, 3)[pixels]
+    p_CQ = ray * depth.reshape(-1)[pixels, None]
+    p_WQ = p_CQ @ X_WC[:2, :3].T.astype(np.float32) + X_WC[:2, 3].astype(np.float32)
+    index = np.rint((p_WQ - origin_W) / cell).astype(int)
+    inside = ((index >= 0) & (index < [columns, rows])).all(axis=1)
+    pixels, index = pixels[inside], index[inside]
+    cells = index[:, 1] * columns + index[:, 0]
+
+    seen = np.zeros(rows * columns, bool)
+    seen[cells] = True
+    above = objects.reshape(-1)[pixels] & (height.reshape(-1)[pixels] > 0)
+    pixels, cells = pixels[above], cells[above]
+    # Written from the lowest to the highest, so that the highest point of a cell remains.
+    rising = np.argsort(height.reshape(-1)[pixels], kind="stable")
+    pixels, cells = pixels[rising], cells[rising]
+    top = np.zeros(rows * columns, np.float32)
+    top[cells] = height.reshape(-1)[pixels]
+    occupied = np.zeros(rows * columns, bool)
+    occupied[cells] = True
+    segmented = np.zeros(rows * columns, bool)
+    segmented[cells] = mask.reshape(-1)[pixels] > 0
+    shape = (rows, columns)
+    return TableMap(
+        origin_W=origin_W,
+        cell=cell,
+        objects=occupied.reshape(shape),
+        segmented=segmented.reshape(shape),
+        height=top.reshape(shape),
+        seen=seen.reshape(shape),
+        work_area_W=(x_min, x_max, y_min, y_max),
+        plane_W=np.asarray(plane_W, float),
+    )

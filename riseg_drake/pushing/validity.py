@@ -1,0 +1,122 @@
+"""Alg. 3, line 10: IsValidPush, the paper's three criteria for a push from b towards c.
+
+Each criterion is a function over N candidates at once. Points are p_W [N, 2] on the table, directions
+unit vectors [N, 2] along bc.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.pushing.pusher import Pusher
+from riseg_drake.pushing.table_map import TableMap
+
+
+@dataclass
+class ValidityParameters:
+    """The constants of IsValidPush."""
+
+    d_push: float = 0.02
+    """How far an object is pushed, m (paper: 2 cm)."""
+    l_act: float = 0.3
+    """Largest share of the moved cluster that may come to lie on other objects (paper: 0.3)."""
+    clearance: float = 0.010
+    """Distance of the pusher's face from the contact where it is lowered, m: the paper's "short
+    distance from b"."""
+
+
+@dataclass(frozen=True)
+class Validity:
+    """What IsValidPush says about N candidates, criterion by criterion."""
+
+    center_on_object: NDArray[np.bool_]
+    accessible: NDArray[np.bool_]
+    moves_alone: NDArray[np.bool_]
+    overlap: NDArray[np.float64]
+    """|isect| / |P| of each candidate."""
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """[N], the paper's IsValidPush."""
+        return self.center_on_object & self.accessible & self.moves_alone
+
+    def why_not(self, candidate: int) -> str | None:
+        """The first criterion that a candidate fails, in words; None if it is valid."""
+        if not self.center_on_object[candidate]:
+            return "the cluster's center does not lie on an object"
+        if not self.accessible[candidate]:
+            return "the area that the end effector needs is not free"
+        if not self.moves_alone[candidate]:
+            share = self.overlap[candidate]
+            return f"{share:.0%} of the cluster would be pushed onto other objects"
+        return None
+
+
+def is_valid_push(
+    b_W: NDArray,
+    direction_W: NDArray,
+    center_W: NDArray,
+    cluster: NDArray[np.bool_],
+    table: TableMap,
+    pusher: Pusher,
+    parameters: ValidityParameters,
+) -> Validity:
+    """IsValidPush for all candidates of one cluster: N contact points b with directions bc, one c.
+
+    `cluster` is P as cells of the map; `table.objects` is objMask.
+    """
+    overlap = overlap_after_push(direction_W, cluster, table, parameters.d_push)
+    return Validity(
+        center_on_object=np.full(len(b_W), center_on_object(center_W, table)),
+        accessible=accessible(b_W, direction_W, table, pusher, parameters.clearance),
+        moves_alone=overlap <= parameters.l_act,
+        overlap=overlap,
+    )
+
+
+def center_on_object(center_W: NDArray, table: TableMap) -> bool:
+    """First criterion: objMask^c = 1."""
+    return bool(table.lookup(table.objects, center_W))
+
+
+def accessible(
+    b_W: NDArray, direction_W: NDArray, table: TableMap, pusher: Pusher, clearance: float
+) -> NDArray[np.bool_]:
+    """Second criterion: objMask = 0 in all of the area the end effector needs, a short distance from b.
+
+    The area is the bar's cross section with its margin all around, the bar's face being `clearance`
+    behind b along cb.
+    """
+    margin = pusher.margin
+    along = _steps(-clearance - pusher.thickness - margin, -clearance + min(margin, clearance / 2), table)
+    across = _steps(-pusher.width / 2 - margin, pusher.width / 2 + margin, table)
+    area = rectangle(b_W, direction_W, along, across)
+    return ~table.lookup(table.objects, area).any(axis=(1, 2))
+
+
+def overlap_after_push(
+    direction_W: NDArray, cluster: NDArray[np.bool_], table: TableMap, distance: float
+) -> NDArray[np.float64]:
+    """Third criterion: |isect| / |P|, where isect is P moved along bc, and objMask without P (eq. 4)."""
+    others = table.objects & ~cluster
+    P = table.points(cluster)
+    if len(P) > 1500:  # a share needs no more points than that
+        P = P[:: len(P) // 1500 + 1]
+    moved = P[None] + distance * direction_W[:, None]
+    return table.lookup(others, moved).mean(axis=1)
+
+
+def rectangle(p_W: NDArray, direction_W: NDArray, along: NDArray, across: NDArray) -> NDArray[np.float64]:
+    """Points [N, S, T, 2] of a grid around each of N points: `along` [S] its direction, `across` [T]."""
+    left_W = np.stack([-direction_W[:, 1], direction_W[:, 0]], axis=1)
+    return (
+        p_W[:, None, None]
+        + along[None, :, None, None] * direction_W[:, None, None]
+        + across[None, None, :, None] * left_W[:, None, None]
+    )
+
+
+def _steps(start: float, stop: float, table: TableMap) -> NDArray[np.float64]:
+    """Values from start to stop, both included, no further apart than the map's cells."""
+    return np.linspace(start, stop, int(np.ceil((stop - start) / table.cell)) + 1)

@@ -1,0 +1,197 @@
+"""Alg. 2, line 7: is a moving group an object already known, two of them, or one that must be split?
+
+The paper gives every group a fresh id at every step. Here the decision is made in one place, from what
+was labelled before (`known`) and what moves now (`moving`), both in the view of t-1:
+
+* a known object that a group covers moves with that group; two known objects may share one;
+* a known object of which a solid part moves otherwise than the rest, by clearly more than noise, was
+  two objects: the larger part keeps the id;
+* unknown pixels that move with an object found in this same episode of motion belong to it;
+* unknown pixels that move with an object known from an earlier episode do not: they stood still when
+  it was found. They are another object, unless they are only a rim;
+* any other solid unknown piece that moves is a new object. It keeps the id that it was given in the
+  frame before, while the reference stays the same.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+UNKNOWN = np.uint16(65535)
+"""Label of pixels above the table that no object has claimed yet; never leaves the propagator."""
+
+
+@dataclass
+class AssociationParameters:
+    """Evidence that a decision needs."""
+
+    area_min: float = 2.0e-4
+    """m^2; a smaller moving piece is no object."""
+    rim: float = 0.004
+    """m; what is nowhere wider than twice that is a rim of something else, not a piece of its own."""
+    split_share: float = 0.2
+    """A part that moves otherwise splits an object if it is at least that share of it."""
+    split_flow: float = 1.5
+    """Pixels (root mean square) by which the two motions must differ for that."""
+    same_share: float = 0.5
+    """Overlap, of the smaller of the two, from which a piece is the one seen in the frame before."""
+
+
+@dataclass(frozen=True)
+class KnownObjects:
+    """What was known at the reference frame."""
+
+    label: NDArray[np.uint16]
+    """[H, W], ids, UNKNOWN, or 0 for the table."""
+    born: dict[int, int]
+    """The episode of motion in which each id was found."""
+    next_id: int
+
+
+@dataclass(frozen=True)
+class Association:
+    """The labels at the reference frame in the light of what moves."""
+
+    label: NDArray[np.uint16]
+    """[H, W], ids, UNKNOWN, or 0."""
+    motion_of: dict[int, int]
+    """The group that each moving id moves with; an id that is not there stands still."""
+    born: dict[int, int]
+    next_id: int
+
+
+def associate(
+    known: KnownObjects,
+    moving: NDArray[np.int16],
+    previous: NDArray[np.uint16] | None,
+    motion_gap: NDArray[np.float64],
+    episode: int,
+    pixels_per_metre: float,
+    parameters: AssociationParameters,
+) -> Association:
+    """Give ids to what moves.
+
+    Args:
+        known: what was labelled before, in the view of t-1.
+        moving: [H, W], 1 + group, 0 = stands still, in the same view.
+        previous: [H, W], the answer for the frame before with the same reference, or None.
+        motion_gap: [1 + G, 1 + G], pixels by which two motions differ; index 0 is standing still.
+        episode: number of the present episode of motion.
+        pixels_per_metre: focal length over distance.
+        parameters: see there.
+    """
+    decision = _Decision(known, previous, episode, pixels_per_metre, parameters)
+    moving = np.where(known.label > 0, moving, 0)
+    for a in known.born:
+        decision.place_known(a, moving, motion_gap)
+    for g in range(1, int(moving.max(initial=0)) + 1):
+        decision.place_unknown(g, (moving == g) & (known.label == UNKNOWN))
+    decision.name_pieces()
+    return Association(decision.label, decision.motion_of, decision.born, decision.next_id)
+
+
+class _Decision:
+    """The labels while they are being decided; lives for one call of `associate`."""
+
+    def __init__(
+        self,
+        known: KnownObjects,
+        previous: NDArray[np.uint16] | None,
+        episode: int,
+        pixels_per_metre: float,
+        parameters: AssociationParameters,
+    ) -> None:
+        self.known, self.previous, self.episode = known, previous, episode
+        self.parameters = parameters
+        self.label = known.label.copy()
+        self.born = dict(known.born)
+        self.next_id = known.next_id
+        self.motion_of: dict[int, int] = {}
+        self.pieces: list[tuple[NDArray[np.bool_], int]] = []
+        self.pixels_min = parameters.area_min * pixels_per_metre**2
+        radius = max(1, round(parameters.rim * pixels_per_metre))
+        self.rim = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
+
+    def place_known(self, a: int, moving: NDArray[np.int16], motion_gap: NDArray) -> None:
+        """Which motion a known object has, and whether it must be split."""
+        inside = self.known.label == a
+        area = np.bincount(moving[inside], minlength=len(motion_gap))
+        if not area.any():
+            return
+        main = int(area.argmax())
+        if main > 0:
+            self.motion_of[a] = main - 1
+        for g in np.flatnonzero(area):
+            if g == main or area[g] < max(self.parameters.split_share * area.sum(), self.pixels_min):
+                continue
+            if motion_gap[g, main] < self.parameters.split_flow:
+                continue
+            part = self._solid(inside & (moving == g))
+            if part is None:
+                continue
+            if self.born[a] == self.episode and g == 0:
+                # It was found in this very episode, and too much of it: give the rest back.
+                self.label[part] = UNKNOWN
+            else:
+                self.pieces.append((part, int(g)))
+
+    def place_unknown(self, g: int, region: NDArray[np.bool_]) -> None:
+        """Whose the unknown pixels are that move with group g - 1."""
+        if np.count_nonzero(region) == 0:
+            return
+        count, piece = cv2.connectedComponents(region.astype(np.uint8), connectivity=4)
+        companions = [a for a, motion in self.motion_of.items() if motion == g - 1]
+        for number in range(1, count):
+            inside = piece == number
+            near = cv2.dilate(inside.astype(np.uint8), self.rim) > 0
+            touching = [a for a in companions if np.any(self.known.label[near] == a)]
+            young = [a for a in touching if self.born[a] == self.episode]
+            solid = self._solid(inside)
+            if young:
+                self.label[inside] = young[0]
+            elif solid is not None:
+                self.pieces.append((solid, g))
+            elif touching:
+                self.label[inside] = touching[0]
+
+    def _solid(self, region: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
+        """The region without its thin parts, or None if little is left: a rim, or too small."""
+        core = cv2.erode(region.astype(np.uint8), self.rim, borderValue=0)
+        opened = (cv2.dilate(core, self.rim) > 0) & region
+        if np.count_nonzero(opened) < max(self.pixels_min, 0.4 * np.count_nonzero(region)):
+            return None
+        return region
+
+    def name_pieces(self) -> None:
+        """Label the new objects: by the ids of the frame before where they are the same pieces."""
+        former = self._former_ids()
+        for number, (inside, g) in enumerate(self.pieces):
+            a = former.get(number)
+            if a is None:
+                a = self.next_id
+            self.next_id = max(self.next_id, a + 1)
+            self.born[a] = self.episode
+            self.label[inside] = a
+            if g > 0:
+                self.motion_of[a] = g - 1
+
+    def _former_ids(self) -> dict[int, int]:
+        """For the pieces that were there in the frame before, their ids; greatest overlap first."""
+        if self.previous is None:
+            return {}
+        overlaps = []
+        for number, (inside, _) in enumerate(self.pieces):
+            candidates, shared = np.unique(self.previous[inside], return_counts=True)
+            for a, pixels in zip(candidates.tolist(), shared.tolist(), strict=True):
+                if a in (0, UNKNOWN) or a in self.known.born:
+                    continue
+                smaller = min(np.count_nonzero(inside), np.count_nonzero(self.previous == a))
+                if pixels >= self.parameters.same_share * smaller:
+                    overlaps.append((pixels, number, a))
+        former: dict[int, int] = {}
+        for _, number, a in sorted(overlaps, reverse=True):
+            if number not in former and a not in former.values():
+                former[number] = a
+        return former

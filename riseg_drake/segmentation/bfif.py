@@ -1,0 +1,141 @@
+"""Alg. 2, lines 3 to 6, in one piece: from the two flows to groups of body frames."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.segmentation.above_table import AboveTable
+from riseg_drake.segmentation.body_frames import (
+    BodyFrameParameters,
+    BodyFrames,
+    sample_body_frames,
+    track_points,
+)
+from riseg_drake.segmentation.effective_flow import MovingParameters, moving_pixels
+from riseg_drake.segmentation.grouping import GroupingParameters, group_twists, renumbered
+from riseg_drake.segmentation.motions import (
+    BFIFGroups,
+    MotionParameters,
+    flow_difference,
+    group_motions,
+    merge_equal_motions,
+    misfits,
+    settle_groups,
+)
+from riseg_drake.segmentation.noise import MeasurementNoise
+from riseg_drake.segmentation.twists import Twists, patch_twists, triplet_twists
+
+
+@dataclass
+class BFIFParameters:
+    """All of lines 3 to 6."""
+
+    noise: MeasurementNoise = field(default_factory=MeasurementNoise)
+    moving: MovingParameters = field(default_factory=MovingParameters)
+    frames: BodyFrameParameters = field(default_factory=BodyFrameParameters)
+    grouping: GroupingParameters = field(default_factory=GroupingParameters)
+    motions: MotionParameters = field(default_factory=MotionParameters)
+    settling_rounds: int = 2
+    """How often groups are settled by their fitted motions; 0 leaves Markov clustering the last word,
+    as in the paper."""
+    space_frame: str = "points"
+    """Where {s} lies: "points" (amid the moving points) or "camera" (C0, as in the paper)."""
+
+
+def group_body_frames(
+    pair: FramePair,
+    expected_flow: NDArray[np.float32],
+    optical_flow: NDArray[np.float32],
+    above_0: AboveTable,
+    parameters: BFIFParameters,
+    rng: np.random.Generator,
+) -> BFIFGroups:
+    """G_t: body frames on what moves, grouped by their spatial twists, with each group's motion.
+
+    Args:
+        pair: the frames of t-1 and t.
+        expected_flow: E_t [H, W, 2], pixels.
+        optical_flow: O_t [H, W, 2], pixels.
+        above_0: objMask at t-1.
+        parameters: see there.
+        rng: draws the body frames.
+    """
+    noise, focal_length = parameters.noise, pair.current.intrinsics.fx
+    moving = moving_pixels(pair, expected_flow, optical_flow, above_0.mask, noise, parameters.moving)
+    if not moving.any():
+        return no_groups()
+    p_C0Q0, p_C0Q1, depth_1 = track_points(pair, optical_flow)
+    frames = sample_body_frames(moving, p_C0Q0, p_C0Q1, depth_1, focal_length, parameters.frames, rng)
+    if len(frames) < parameters.grouping.members_min:
+        return no_groups()
+    twists = _calc_bfifs(frames, above_0.depth_noise, focal_length, parameters)
+    group, motions = _settled_groups(frames, twists, above_0.depth_noise, focal_length, parameters)
+    seeds = frames.p_C0Q0[:, 0]
+    spans = [flow_difference(seeds[group == g], X, np.eye(4), focal_length) for g, X in enumerate(motions)]
+    return BFIFGroups(
+        pixel=frames.pixel,
+        V_S=twists.V_S,
+        covariance=twists.covariance,
+        p_C0S=twists.p_C0S,
+        group=group,
+        motion_C0=motions,
+        p_C0Q=seeds,
+        flow_span=max(spans, default=0.0),
+    )
+
+
+def _settled_groups(
+    frames: BodyFrames,
+    twists: Twists,
+    depth_noise: float,
+    focal_length: float,
+    parameters: BFIFParameters,
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Line 6, GroupBFIFs: the group of each frame, and the groups' motions.
+
+    Markov clustering proposes groups; frames that a group's motion does not explain are clustered
+    again among themselves, and motions that cannot be told apart are joined.
+    """
+
+    def fit(group: NDArray[np.intp]) -> NDArray[np.float64]:
+        return group_motions(frames, group, parameters.noise, depth_noise, focal_length)
+
+    group = group_twists(twists, parameters.grouping)
+    for _ in range(parameters.settling_rounds):
+        misfit = misfits(frames, fit(group), parameters.noise, depth_noise, focal_length)
+        group = settle_groups(frames, misfit, twists.misfit, parameters.motions)
+        left = group < 0
+        again = group_twists(twists.subset(left), parameters.grouping)
+        group[left] = np.where(again >= 0, again + misfit.shape[1], -1)
+        group = renumbered(group, parameters.grouping.members_min)
+    group = merge_equal_motions(frames, group, fit(group), focal_length, parameters.motions)
+    return group, fit(group)
+
+
+def no_groups() -> BFIFGroups:
+    """G_t where nothing moves."""
+    return BFIFGroups(
+        pixel=np.empty((0, 2), np.intp),
+        V_S=np.empty((0, 6)),
+        covariance=np.empty((0, 6, 6)),
+        p_C0S=np.zeros(3),
+        group=np.empty(0, np.intp),
+        motion_C0=np.empty((0, 4, 4)),
+        p_C0Q=np.empty((0, 3)),
+        flow_span=0.0,
+    )
+
+
+def _calc_bfifs(
+    frames: BodyFrames, depth_noise: float, focal_length: float, parameters: BFIFParameters
+) -> Twists:
+    """Line 5, CalcBFIFs, in the space frame that the parameters ask for."""
+    if parameters.space_frame not in ("points", "camera"):
+        raise ValueError(f"no space frame {parameters.space_frame!r}: choose points or camera")
+    at_points = parameters.space_frame == "points"
+    p_C0S = frames.p_C0Q0[:, 0].mean(0) if at_points else np.zeros(3)
+    if parameters.frames.kind == "triplets":
+        return triplet_twists(frames, p_C0S)
+    return patch_twists(frames, p_C0S, parameters.noise.flow, depth_noise, focal_length)

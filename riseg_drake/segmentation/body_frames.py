@@ -1,0 +1,147 @@
+"""Alg. 2, line 4: body frames on what moves.
+
+A body frame here is a handful of points, given at t-1 and at t, both measured in the camera frame C0
+of t-1 (the motion of the camera taken out): `triplets` of the paper, or `patches` of a few dozen.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.camera import Intrinsics, back_project, pixel_grid
+from riseg_drake.geometry.rgbd import FramePair, unhidden_depth
+from riseg_drake.geometry.se3 import inverse, move_points
+
+
+@dataclass
+class BodyFrameParameters:
+    """How body frames are sampled."""
+
+    kind: str = "patches"
+    """"patches" (least squares over many points) or "triplets" (three points, as in the paper)."""
+    count: int = 120
+    """How many body frames; the paper's n counts sampled pixels and is not given."""
+    diameter: float = 0.024
+    """d_a, m: no two points of one frame are further apart; not given in the paper."""
+    points: int = 24
+    """Points tried for each patch."""
+    points_min: int = 8
+    """A patch with fewer good points is dropped."""
+    width_min: float = 0.1
+    """Smallest ratio of a frame's two extents: below it, the points are as good as collinear."""
+
+
+@dataclass(frozen=True)
+class BodyFrames:
+    """K body frames of up to M points each."""
+
+    pixel: NDArray[np.intp]
+    """[K, 2], the seed's (v, u) at t-1."""
+    p_C0Q0: NDArray[np.float64]
+    """[K, M, 3], the points at t-1, m."""
+    p_C0Q1: NDArray[np.float64]
+    """[K, M, 3], the same points at t, seen from the unmoved camera C0, m."""
+    depth_1: NDArray[np.float64]
+    """[K, M], depth at t, m (its noise is not that of t-1)."""
+    used: NDArray[np.bool_]
+    """[K, M], points that belong to the frame."""
+
+    def __len__(self) -> int:
+        """The number of frames K."""
+        return len(self.pixel)
+
+
+def track_points(
+    pair: FramePair, optical_flow: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    """Every pixel's point at t-1 and at t, both in C0: p_C0Q0, p_C0Q1 [H, W, 3], and its depth at t.
+
+    Depth at t is looked up where O_t (not X_t) leads, at the nearest pixel so that no depth is mixed
+    across an edge, and carried back by the inverse camera motion. 0 depth marks what cannot be tracked.
+    """
+    intrinsics = pair.current.intrinsics
+    target = pixel_grid(*intrinsics.shape) + optical_flow
+    depth_1 = cv2.remap(unhidden_depth(pair.current), target, None, cv2.INTER_NEAREST, borderValue=0)
+    p_C1Q1 = _rays_at(target, intrinsics) * depth_1[..., None]
+    p_C0Q1 = move_points(inverse(pair.X_C1C0), p_C1Q1)
+    p_C0Q0 = back_project(pair.reference.depth, intrinsics)
+    return p_C0Q0, p_C0Q1, np.where(pair.reference.depth > 0, depth_1, np.float32(0))
+
+
+def sample_body_frames(
+    moving: NDArray[np.bool_],
+    p_C0Q0: NDArray[np.float32],
+    p_C0Q1: NDArray[np.float32],
+    depth_1: NDArray[np.float32],
+    focal_length: float,
+    parameters: BodyFrameParameters,
+    rng: np.random.Generator,
+) -> BodyFrames:
+    """Random body frames on moving pixels: not collinear, no wider than d_a (Alg. 2, line 4).
+
+    Args:
+        moving: [H, W], ||X_t|| >> 0.
+        p_C0Q0: [H, W, 3] and
+        p_C0Q1: [H, W, 3], tracked points, m.
+        depth_1: [H, W], depth of p_C0Q1 at t, 0 = not tracked.
+        focal_length: pixels; with the depth it turns d_a into pixels.
+        parameters: see there; ValueError for an unknown kind.
+        rng: draws seeds and neighbours.
+    """
+    if parameters.kind not in ("patches", "triplets"):
+        raise ValueError(f"no body frames {parameters.kind!r}: choose patches or triplets")
+    good = moving & (depth_1 > 0) & (p_C0Q0[..., 2] > 0)
+    seeds = _spread_seeds(good, parameters.count, rng)
+    is_triplet = parameters.kind == "triplets"
+    neighbours = 2 if is_triplet else parameters.points - 1
+    height, width = good.shape
+
+    # Neighbours lie uniformly in a disk of radius d_a / 2 about the seed, so all are within d_a.
+    z = p_C0Q0[seeds[:, 0], seeds[:, 1], 2]
+    radius = 0.5 * parameters.diameter * focal_length / np.maximum(z, 1e-3)
+    r = radius[:, None] * np.sqrt(rng.uniform(0.01, 1, (len(seeds), neighbours)))
+    phi = rng.uniform(0, 2 * np.pi, (len(seeds), neighbours))
+    offset = np.stack([r * np.sin(phi), r * np.cos(phi)], axis=-1)
+    vu = seeds[:, None] + np.concatenate([np.zeros((len(seeds), 1, 2)), np.rint(offset)], 1).astype(int)
+    inside = (vu >= 0).all(-1) & (vu[..., 0] < height) & (vu[..., 1] < width)
+    v, u = np.clip(vu[..., 0], 0, height - 1), np.clip(vu[..., 1], 0, width - 1)
+
+    p_0, p_1 = p_C0Q0[v, u].astype(float), p_C0Q1[v, u].astype(float)
+    near = np.linalg.norm(p_0 - p_0[:, :1], axis=-1) <= 0.5 * parameters.diameter * 1.2
+    used = inside & good[v, u] & near
+    enough = used.sum(1) >= (3 if is_triplet else parameters.points_min)
+    keep = enough & (_extent_ratio(p_0, used) >= parameters.width_min)
+    return BodyFrames(seeds[keep], p_0[keep], p_1[keep], depth_1[v, u][keep].astype(float), used[keep])
+
+
+def _rays_at(uv: NDArray[np.float32], intrinsics: Intrinsics) -> NDArray[np.float32]:
+    """Points at unit depth behind arbitrary pixels [..., 2]."""
+    ray = np.ones((*uv.shape[:-1], 3), np.float32)
+    ray[..., 0] = (uv[..., 0] - np.float32(intrinsics.cx)) * np.float32(1 / intrinsics.fx)
+    ray[..., 1] = (uv[..., 1] - np.float32(intrinsics.cy)) * np.float32(1 / intrinsics.fy)
+    return ray
+
+
+def _spread_seeds(good: NDArray[np.bool_], count: int, rng: np.random.Generator) -> NDArray[np.intp]:
+    """Up to `count` pixels (v, u), one to a cell of a grid fine enough to have that many cells.
+
+    Even spreading gives a small moving object its frames beside a large one.
+    """
+    vu = np.argwhere(good)
+    if len(vu) <= count:
+        return vu
+    vu = rng.permutation(vu)
+    cell = max(1, int(np.sqrt(len(vu) / count)))
+    _, first = np.unique((vu[:, 0] // cell) * good.shape[1] + vu[:, 1] // cell, return_index=True)
+    return vu[rng.permutation(first)[:count]]
+
+
+def _extent_ratio(p: NDArray, used: NDArray[np.bool_]) -> NDArray:
+    """Ratio of the second to the first extent of each frame's points: 0 where they are collinear."""
+    weight = used / np.maximum(used.sum(1, keepdims=True), 1)
+    offset = p - np.einsum("km,kmi->ki", weight, p)[:, None]
+    covariance = np.einsum("km,kmi,kmj->kij", weight, offset, offset)
+    extents = np.sqrt(np.maximum(np.linalg.eigvalsh(covariance), 0))
+    return extents[:, 1] / np.maximum(extents[:, 2], 1e-12)

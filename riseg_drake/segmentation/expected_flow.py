@@ -1,0 +1,44 @@
+"""Alg. 2, line 1: the flow that the camera's own motion causes in a world that stands still."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.camera import Intrinsics, pixel_grid, rays
+
+
+def flow_of_motion(
+    depth: NDArray[np.float32], X_C1C0: NDArray[np.float64], intrinsics: Intrinsics
+) -> NDArray[np.float32]:
+    """Where the points behind the pixels of C0 appear in C1, less where they were.
+
+    Args:
+        depth: [H, W], metres, of the view C0; 0 = invalid.
+        X_C1C0: [4, 4], takes points of C0 to C1. For E_t this is the paper's camT_{t-1,t}; for a body
+            that moves it is camT times the body's motion.
+        intrinsics: of both views.
+
+    Returns:
+        [H, W, 2], pixels; NaN where depth is invalid or the point is not ahead of C1.
+    """
+    # Eq. 4 and 5 in inverse depth: camT [z r; 1] projects like R r + p / z, which needs no dMap.
+    R, p = X_C1C0[:3, :3].astype(np.float32), X_C1C0[:3, 3].astype(np.float32)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse_depth = np.where(depth > 0, np.float32(1) / depth, np.float32(np.nan))
+        ray = rays(intrinsics)
+        r_x, r_y = ray[..., 0], ray[..., 1]
+        x = R[0, 0] * r_x + R[0, 1] * r_y + (R[0, 2] + p[0] * inverse_depth)
+        y = R[1, 0] * r_x + R[1, 1] * r_y + (R[1, 2] + p[1] * inverse_depth)
+        z = R[2, 0] * r_x + R[2, 1] * r_y + (R[2, 2] + p[2] * inverse_depth)
+        per_z = np.where(z > 0, np.float32(1) / z, np.float32(np.nan))
+    uv = pixel_grid(*intrinsics.shape)
+    flow = np.empty((*depth.shape, 2), np.float32)
+    flow[..., 0] = x * per_z * np.float32(intrinsics.fx) + np.float32(intrinsics.cx) - uv[..., 0]
+    flow[..., 1] = y * per_z * np.float32(intrinsics.fy) + np.float32(intrinsics.cy) - uv[..., 1]
+    return flow
+
+
+def expected_flow(
+    depth_0: NDArray[np.float32], X_C1C0: NDArray[np.float64], intrinsics: Intrinsics
+) -> NDArray[np.float32]:
+    """E_t [H, W, 2] in pixels: the flow due to the camera's motion alone (eq. 4 and 5)."""
+    return flow_of_motion(depth_0, X_C1C0, intrinsics)

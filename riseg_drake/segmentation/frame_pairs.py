@@ -1,0 +1,68 @@
+"""Which frame is t-1? The pair (t-1, t) should span some pixels of motion, whatever the camera's rate.
+
+At half a pixel the relative error of flow is three times what it is at three pixels, and two motions
+that differ little are told apart only when both have gone some way. So the reference frame stays while
+things move, and is renewed when the pair spans enough, or when nothing moves and the camera goes on.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from riseg_drake.geometry.rgbd import Frame, FramePair
+from riseg_drake.geometry.se3 import log_se3
+
+
+@dataclass
+class FramePairParameters:
+    """How far apart the two frames of a pair may be."""
+
+    kind: str = "motion"
+    """"motion" or, as in the paper, "consecutive"."""
+    flow_span: float = 20.0
+    """Effective flow, pixels, after which the reference is renewed."""
+    moving: float = 0.5
+    """Effective flow, pixels, from which something moves."""
+    camera_span_moving: float = 0.08
+    """Shift of the image by the camera's motion, as a share of its width, that is allowed while
+    something moves."""
+    camera_span_still: float = 0.015
+    """The same while nothing moves."""
+    age_still: float = 1.0
+    """s; while nothing moves the reference is at most that old."""
+
+
+def next_pair(
+    pair: FramePair | None, frame: Frame, flow_span: float, parameters: FramePairParameters
+) -> FramePair:
+    """The pair for a new frame.
+
+    Args:
+        pair: the pair before, None at the first frame (which is then paired with itself).
+        frame: the newest frame.
+        flow_span: effective flow found in the pair before, pixels.
+        parameters: see there; ValueError for an unknown kind.
+    """
+    if parameters.kind not in ("motion", "consecutive"):
+        raise ValueError(f"no frame pairs {parameters.kind!r}: choose motion or consecutive")
+    if pair is None:
+        return FramePair(frame, frame)
+    if parameters.kind == "consecutive":
+        return FramePair(pair.current, frame)
+    if flow_span >= parameters.moving:
+        renew = flow_span > parameters.flow_span
+        share = parameters.camera_span_moving
+    else:
+        renew = frame.time - pair.reference.time > parameters.age_still
+        share = parameters.camera_span_still
+    renew |= camera_span(pair.reference, frame) > share * frame.intrinsics.width
+    return FramePair(pair.current if renew else pair.reference, frame)
+
+
+def camera_span(reference: Frame, current: Frame) -> float:
+    """About how many pixels the camera's motion shifts the image between two frames."""
+    V = log_se3(FramePair(reference, current).X_C1C0)
+    depth = current.depth[:: current.depth.shape[0] // 24 or 1, :: current.depth.shape[1] // 24 or 1]
+    z = float(np.median(depth[depth > 0])) if (depth > 0).any() else 1.0
+    focal_length = current.intrinsics.fx
+    return focal_length * float(np.linalg.norm(V[3:]) / z + np.linalg.norm(V[:3]))

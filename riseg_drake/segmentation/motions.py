@@ -1,0 +1,178 @@
+"""From groups of body frames to the rigid motions that they share (end of Alg. 2, line 6)."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.rgbd import Immutable
+from riseg_drake.geometry.se3 import exp_se3, move_points, translation
+from riseg_drake.segmentation.body_frames import BodyFrames
+from riseg_drake.segmentation.noise import MeasurementNoise
+from riseg_drake.segmentation.twists import fit_motion, point_precision
+
+_AHEAD = np.array([[0.0, 0.0, 0.4], [0.05, 0.0, 0.4], [0.0, 0.05, 0.4]])
+"""Points to compare motions by, m, where there are no others."""
+_POINTS_MAX = 1500
+"""A motion of six numbers needs no more points than that."""
+
+
+@dataclass
+class MotionParameters:
+    """When two groups are one body after all, and when a group's motion is none."""
+
+    merge_flow: float = 0.35
+    """Pixels (root mean square); two motions that predict flow within that are one: no clustering can
+    tell them apart, and Markov clustering splits a body now and then."""
+    still_flow: float = 0.7
+    """Pixels (root mean square); a group that moves less than that stands still."""
+
+    misfit_max: float = 3.0
+    """A body frame belongs to a motion that explains its points at most so many times worse than its
+    own best motion does (mean squared residual)."""
+
+
+@dataclass(frozen=True)
+class BFIFGroups(Immutable):
+    """G_t: the body frames, the group of each, and the motion of each group."""
+
+    pixel: NDArray[np.intp]
+    """[K, 2], seeds (v, u) in the view of t-1."""
+    V_S: NDArray[np.float64]
+    """[K, 6], their spatial twists, [omega; v], radian and metre per pair."""
+    covariance: NDArray[np.float64]
+    """[K, 6, 6]."""
+    p_C0S: NDArray[np.float64]
+    """[3], the origin of the space frame {s}."""
+    group: NDArray[np.intp]
+    """[K], 0..G-1, or -1 for a frame that belongs to none."""
+    motion_C0: NDArray[np.float64]
+    """[G, 4, 4]: takes a body's points at t-1 to where they are at t, both seen from C0."""
+    p_C0Q: NDArray[np.float64]
+    """[K, 3], the seeds' points at t-1, m."""
+    flow_span: float
+    """Effective flow of the fastest group (root mean square over its frames), pixels; 0 if none."""
+
+    def __len__(self) -> int:
+        """The number of groups G."""
+        return len(self.motion_C0)
+
+
+def group_motions(
+    frames: BodyFrames,
+    group: NDArray[np.intp],
+    noise: MeasurementNoise,
+    depth_noise: float,
+    focal_length: float,
+) -> NDArray[np.float64]:
+    """The rigid motion [G, 4, 4] in C0 that fits all points of each group's frames best."""
+    motions = []
+    for g in range(group.max(initial=-1) + 1):
+        used = frames.used & (group == g)[:, None]
+        stride = max(1, int(used.sum() // _POINTS_MAX))
+        q_0, q_1, z_1 = (a[used][::stride] for a in (frames.p_C0Q0, frames.p_C0Q1, frames.depth_1))
+        W = point_precision(q_0, z_1, noise.flow, depth_noise, focal_length)
+        centre = q_0.mean(0)
+        everyone = np.ones((1, len(q_0)), bool)
+        V_B, _, _ = fit_motion((q_0 - centre)[None], (q_1 - centre)[None], W[None], everyone)
+        motions.append(translation(centre) @ exp_se3(V_B[0]) @ translation(-centre))
+    return np.array(motions).reshape(-1, 4, 4)
+
+
+def misfits(
+    frames: BodyFrames,
+    motions: NDArray,
+    noise: MeasurementNoise,
+    depth_noise: float,
+    focal_length: float,
+) -> NDArray[np.float64]:
+    """Mean squared normalised residual [K, G] of each body frame's points under each motion."""
+    W = point_precision(frames.p_C0Q0, frames.depth_1, noise.flow, depth_noise, focal_length)
+    count = 3.0 * frames.used.sum(1)
+    columns = []
+    for X in motions:
+        residual = frames.p_C0Q1 - move_points(X, frames.p_C0Q0)
+        squared = np.einsum("kmi,kmij,kmj->km", residual, W, residual)
+        columns.append((squared * frames.used).sum(1) / count)
+    return np.stack(columns, axis=1) if columns else np.empty((len(frames), 0))
+
+
+def settle_groups(
+    frames: BodyFrames,
+    misfit: NDArray[np.float64],
+    own_misfit: NDArray[np.float64],
+    parameters: MotionParameters,
+) -> NDArray[np.intp]:
+    """Each body frame's group once more, now that the groups' motions are known; -1 where none fits.
+
+    Clusters compare twists two by two; a motion fitted to a whole group is far sharper than that.
+
+    Args:
+        frames: K body frames.
+        misfit: [K, G], of each frame under each group's motion.
+        own_misfit: [K], of each frame under its own motion.
+        parameters: see there.
+    """
+    if misfit.shape[1] == 0:
+        return np.full(len(frames), -1)
+    best = misfit.argmin(1)
+    fits = misfit.min(1) <= parameters.misfit_max * np.maximum(own_misfit, 1.0)
+    return np.where(fits, best, -1)
+
+
+def flow_difference(p_C0Q: NDArray, X: NDArray, Y: NDArray, focal_length: float) -> float:
+    """How far apart, in pixels (root mean square), two motions X, Y [4, 4] of C0 take points [N, 3]."""
+    apart = (move_points(X, p_C0Q) - move_points(Y, p_C0Q))[:, :2] * (focal_length / p_C0Q[:, 2:])
+    return float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
+
+
+def merge_equal_motions(
+    frames: BodyFrames,
+    group: NDArray[np.intp],
+    motions: NDArray,
+    focal_length: float,
+    parameters: MotionParameters,
+) -> NDArray[np.intp]:
+    """The groups, joined where their motions cannot be told apart, dropped where they stand still.
+
+    Groups come largest first, so a group joins the largest one that moves like it.
+    """
+    p = frames.p_C0Q0[:, 0]
+    new_of = {-1: -1}
+    leaders: list[int] = []
+    for g, X in enumerate(motions):
+        mine = p[group == g]
+        if flow_difference(mine, X, np.eye(4), focal_length) < parameters.still_flow:
+            new_of[g] = -1
+            continue
+        for number, leader in enumerate(leaders):
+            both = p[(group == g) | (group == leader)]
+            if flow_difference(both, X, motions[leader], focal_length) < parameters.merge_flow:
+                new_of[g] = number
+                break
+        else:
+            new_of[g] = len(leaders)
+            leaders.append(g)
+    return np.array([new_of[int(g)] for g in group], dtype=np.intp)
+
+
+def motion_gaps(p_C0Q: NDArray, motions: NDArray, focal_length: float) -> NDArray[np.float64]:
+    """Pixels by which standing still (index 0) and the motions [G, 4, 4] differ, [1 + G, 1 + G]."""
+    all_motions = [np.eye(4), *motions]
+    return np.array([[flow_difference(p_C0Q, X, Y, focal_length) for Y in all_motions] for X in all_motions])
+
+
+def with_earlier_motions(
+    groups: BFIFGroups, earlier: Iterable[NDArray], focal_length: float, parameters: MotionParameters
+) -> NDArray[np.float64]:
+    """The groups' motions, then those found earlier that no group has now, [G', 4, 4].
+
+    What has moved since the reference frame stays displaced, even in a frame in which no group says so.
+    """
+    motions = list(groups.motion_C0)
+    for X in earlier:
+        p = groups.p_C0Q if len(groups.p_C0Q) else _AHEAD
+        if all(flow_difference(p, X, Y, focal_length) > parameters.merge_flow for Y in motions):
+            motions.append(X)
+    return np.array(motions).reshape(-1, 4, 4)

@@ -1,0 +1,126 @@
+"""Alg. 2, line 7, first half: the mask L_t-1 carried to t.
+
+The labels stay where they were decided, in the view of the reference frame, and each pixel of the
+current view looks up where its point was: carried back by the camera's motion and by the motion of
+the object, in float, without rounding from frame to frame. The current depth image then draws the
+outline, so nothing creeps.
+"""
+
+from collections.abc import Mapping
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.camera import Intrinsics, back_project, project
+from riseg_drake.geometry.rgbd import Frame, FramePair
+from riseg_drake.geometry.se3 import inverse, move_points
+from riseg_drake.segmentation.association import UNKNOWN
+
+_DEPTH_AGREES = 0.008
+"""m; a point and the surface it is looked up on are the same within that (noise, slopes, edges)."""
+
+_REACH = 0.005
+"""m; how far from its surroundings a pixel may take its label, where it has none of its own."""
+
+
+def carry_labels(
+    pair: FramePair,
+    label_0: NDArray[np.uint16],
+    motion_of: Mapping[int, NDArray[np.float64]],
+    above_1: NDArray[np.bool_],
+    remembered_1: NDArray[np.uint16],
+) -> NDArray[np.uint16]:
+    """The labels of the reference frame, in the view of the current one.
+
+    Args:
+        pair: reference and current frame.
+        label_0: [H, W], ids, UNKNOWN or 0, at the reference frame.
+        motion_of: for the ids that moved, the motion [4, 4] in C0 from t-1 to t.
+        above_1: [H, W], objMask of the current frame.
+        remembered_1: [H, W], ids where points that the reference frame did not see should be now.
+
+    Returns:
+        [H, W], ids, UNKNOWN or 0: every pixel above the table has a label, no other has one.
+    """
+    current = pair.current
+    vu = np.nonzero(above_1)
+    z_1 = current.depth[vu]
+    p_C1Q = back_project(current.depth, current.intrinsics)[vu]
+    label = np.zeros(len(z_1), np.uint16)
+    gap = np.full(len(z_1), _DEPTH_AGREES, np.float32)
+    X_C0C1 = inverse(pair.X_C1C0)
+
+    moving_ids = np.zeros(65536, bool)
+    moving_ids[list(motion_of)] = True
+    for ids, motion in _by_motion(motion_of):
+        p_C0Q = move_points(inverse(motion) @ X_C0C1, p_C1Q)
+        found, apart = _look_up(p_C0Q, label_0, pair.reference)
+        agrees = np.isin(found, ids) if ids else (found > 0) & ~moving_ids[found]
+        better = (z_1 > 0) & agrees & (apart < gap)
+        label[better] = found[better]
+        gap[better] = apart[better]
+
+    out = np.zeros(above_1.shape, np.uint16)
+    out[vu] = label
+    lost = above_1 & (out == 0) & (remembered_1 > 0)
+    out[lost] = remembered_1[lost]
+    reach = _REACH * current.intrinsics.fx / float(np.median(z_1[z_1 > 0])) if (z_1 > 0).any() else 0.0
+    return nearest_label(out, above_1, reach)
+
+
+def nearest_label(label: NDArray[np.uint16], inside: NDArray[np.bool_], reach: float) -> NDArray[np.uint16]:
+    """Give each unlabelled pixel inside the label nearest to it, UNKNOWN beyond `reach` pixels.
+
+    Objects that come into view, or are put there, must not become part of their neighbours.
+    """
+    empty = inside & (label == 0)
+    if not empty.any():
+        return label
+    out = label.copy()
+    out[empty] = UNKNOWN
+    if label.any():
+        distance, index = cv2.distanceTransformWithLabels(
+            (label == 0).astype(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
+        )
+        value = np.zeros(index.max() + 1, np.uint16)
+        value[index[label > 0]] = label[label > 0]
+        near = empty & (distance <= reach)
+        out[near] = value[index[near]]
+    return out
+
+
+def pixels_of(p_CQ: NDArray, intrinsics: Intrinsics) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Nearest pixels (v, u) [N, 2] of points [N, 3], and which of them lie in the image."""
+    uv = project(p_CQ, intrinsics)
+    vu = np.rint(np.nan_to_num(uv[:, ::-1], nan=-1.0)).astype(np.intp)
+    inside = (vu >= 0).all(1) & (vu[:, 0] < intrinsics.height) & (vu[:, 1] < intrinsics.width)
+    return vu, inside
+
+
+def _by_motion(motion_of: Mapping[int, NDArray]) -> list[tuple[list[int], NDArray]]:
+    """Ids that share a motion, together; standing still (no ids) first."""
+    groups: list[tuple[list[int], NDArray]] = [([], np.eye(4))]
+    for a, motion in motion_of.items():
+        for ids, shared in groups[1:]:
+            if shared is motion or np.array_equal(shared, motion):
+                ids.append(a)
+                break
+        else:
+            groups.append(([a], motion))
+    return groups
+
+
+def _look_up(
+    p_CQ: NDArray, label: NDArray[np.uint16], frame: Frame
+) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
+    """Label at each point's pixel, and how far (m) the surface seen there is from the point."""
+    vu, inside = pixels_of(p_CQ, frame.intrinsics)
+    found = np.zeros(len(p_CQ), np.uint16)
+    apart = np.full(len(p_CQ), np.inf, np.float32)
+    v, u = vu[inside, 0], vu[inside, 1]
+    found[inside] = label[v, u]
+    z_0 = frame.depth[v, u]
+    # Where depth has a hole the label alone must do, but any measured agreement is better.
+    apart[inside] = np.where(z_0 > 0, np.abs(z_0 - p_CQ[inside, 2]), 0.99 * _DEPTH_AGREES)
+    return found, apart

@@ -1,0 +1,251 @@
+"""Alg. 2, line 7, whole: the groups G_t and the mask L_t-1 make the mask L_t."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.camera import back_project, pixel_grid
+from riseg_drake.geometry.rgbd import FramePair, Immutable
+from riseg_drake.segmentation.above_table import AboveTable
+from riseg_drake.segmentation.association import (
+    UNKNOWN,
+    AssociationParameters,
+    KnownObjects,
+    associate,
+)
+from riseg_drake.segmentation.effective_flow import effective_flow
+from riseg_drake.segmentation.growth import GrowthParameters, grow_by_similar_flow, label_by_motion
+from riseg_drake.segmentation.memory import Memory, draw_memory, moved_memory, remember
+from riseg_drake.segmentation.motions import (
+    BFIFGroups,
+    MotionParameters,
+    motion_gaps,
+    with_earlier_motions,
+)
+from riseg_drake.segmentation.noise import MeasurementNoise
+from riseg_drake.segmentation.propagation import carry_labels
+
+
+@dataclass
+class SegmentParameters:
+    """All of line 7."""
+
+    noise: MeasurementNoise = field(default_factory=MeasurementNoise)
+    motions: MotionParameters = field(default_factory=MotionParameters)
+    growth: GrowthParameters = field(default_factory=GrowthParameters)
+    association: AssociationParameters = field(default_factory=AssociationParameters)
+    propagation: str = "reference"
+    """"reference" (labels carried from the reference frame by each object's own motion) or "flow"
+    (every frame by O_t, in whole pixels, as in the paper)."""
+    ids: str = "evidence"
+    """"evidence" (see association.py) or "fresh" (each group a new id, as in the paper)."""
+    memory: bool = True
+    """Remember objects that leave the view (not in the paper)."""
+    episode_gap: float = 0.7
+    """s without motion after which motion is a new episode."""
+
+
+@dataclass(frozen=True)
+class Segmentation(Immutable):
+    """L_t, and what must be remembered for L_t+1: the propagator's one state."""
+
+    sequence: int
+    """Number of the frame that `label` belongs to; -1 before the first."""
+    label: NDArray[np.uint16]
+    """[H, W], ids, UNKNOWN where something stands that has not moved yet, 0 for table and robot."""
+    reference_sequence: int
+    """Number of the reference frame that the next fields belong to."""
+    known: KnownObjects
+    """What was known at the reference frame, before the motion since then."""
+    decided: NDArray[np.uint16]
+    """[H, W], labels at the reference frame in the light of the motion since then."""
+    motion_of: dict[int, NDArray[np.float64]]
+    """Motion [4, 4] in C0 since the reference frame, of the ids that moved."""
+    memory: Memory
+    """Points of objects that the reference frame does not see, as of its time."""
+    hidden: Memory
+    """Points of objects that the frame `sequence` does not see, as of its time."""
+    born: dict[int, int]
+    next_id: int
+    episode: int
+    """Counts the times that something began to move."""
+    last_motion: float
+    """When something moved last, s."""
+
+    @property
+    def mask(self) -> NDArray[np.uint16]:
+        """L_t [H, W]: object ids, 0 = background."""
+        return np.where(self.label == UNKNOWN, np.uint16(0), self.label)
+
+    @property
+    def object_ids(self) -> tuple[int, ...]:
+        """All ids ever found, in the view or not."""
+        return tuple(sorted(self.born))
+
+
+def nothing_segmented(shape: tuple[int, int]) -> Segmentation:
+    """L_0: an empty mask [H, W] (Alg. 1, line 3)."""
+    empty = np.zeros(shape, np.uint16)
+    return Segmentation(
+        sequence=-1,
+        label=empty,
+        reference_sequence=-1,
+        known=KnownObjects(empty, {}, 1),
+        decided=empty,
+        motion_of={},
+        memory={},
+        hidden={},
+        born={},
+        next_id=1,
+        episode=0,
+        last_motion=-np.inf,
+    )
+
+
+def segment(
+    before: Segmentation,
+    pair: FramePair,
+    expected_flow: NDArray[np.float32],
+    optical_flow: NDArray[np.float32],
+    groups: BFIFGroups,
+    above_0: AboveTable,
+    above_1: AboveTable,
+    parameters: SegmentParameters,
+) -> Segmentation:
+    """L_t from G_t, O_t and L_t-1.
+
+    Args:
+        before: L_t-1; if it already belongs to this pair's frame it is the answer.
+        pair: the frames of t-1 and t.
+        expected_flow: E_t [H, W, 2], pixels.
+        optical_flow: O_t [H, W, 2], pixels.
+        groups: G_t.
+        above_0: objMask at t-1.
+        above_1: objMask at t.
+        parameters: see there.
+    """
+    if before.sequence == pair.current.sequence:
+        return before
+    now = _renew_reference(before, pair, above_0, parameters)
+    if len(groups):
+        starts = pair.current.time - before.last_motion > parameters.episode_gap
+        now = replace(now, last_motion=pair.current.time, episode=now.episode + int(starts))
+    motions = with_earlier_motions(
+        groups, now.motion_of.values(), pair.current.intrinsics.fx, parameters.motions
+    )
+    moving = _grow(pair, expected_flow, optical_flow, groups, motions, above_0, parameters)
+    now = _decide(now, pair, groups, motions, moving, above_0, parameters)
+    if parameters.propagation == "flow":
+        label = push_by_flow(now.decided, optical_flow)
+    elif parameters.propagation == "reference":
+        remembered = moved_memory(now.memory, now.motion_of, pair.reference.X_WC)
+        drawn = draw_memory(remembered, pair.current)
+        label = carry_labels(pair, now.decided, now.motion_of, above_1.mask, drawn)
+    else:
+        raise ValueError(f"no propagation {parameters.propagation!r}: choose reference or flow")
+    if parameters.memory:
+        now = replace(now, hidden=remember(now.memory, pair, now.decided, now.motion_of))
+    return replace(now, sequence=pair.current.sequence, label=label)
+
+
+def push_by_flow(label: NDArray[np.uint16], optical_flow: NDArray[np.float32]) -> NDArray[np.uint16]:
+    """L_t(x, y) = L_t-1(i, j) with (x, y) = (i, j) + O_t(i, j) in whole pixels, as the paper writes it."""
+    out = np.zeros_like(label)
+    v, u = np.nonzero(label)
+    target = np.rint(pixel_grid(*label.shape)[v, u] + optical_flow[v, u]).astype(int)
+    inside = (target >= 0).all(1) & (target[:, 0] < label.shape[1]) & (target[:, 1] < label.shape[0])
+    out[target[inside, 1], target[inside, 0]] = label[v, u][inside]
+    return out
+
+
+def _renew_reference(
+    before: Segmentation, pair: FramePair, above_0: AboveTable, parameters: SegmentParameters
+) -> Segmentation:
+    """What is known at this pair's reference frame."""
+    if pair.reference.sequence == before.reference_sequence:
+        return before
+    # The new reference is the frame before this one, so its labels are those decided last.
+    label = before.label
+    if before.sequence != pair.reference.sequence or label.shape != above_0.mask.shape:
+        label = np.where(above_0.mask, UNKNOWN, np.uint16(0))
+    return replace(
+        before,
+        reference_sequence=pair.reference.sequence,
+        known=KnownObjects(label, before.born, before.next_id),
+        decided=label,
+        motion_of={},
+        memory=before.hidden,
+    )
+
+
+def _grow(
+    pair: FramePair,
+    expected_flow: NDArray[np.float32],
+    optical_flow: NDArray[np.float32],
+    groups: BFIFGroups,
+    motions: NDArray[np.float64],
+    above_0: AboveTable,
+    parameters: SegmentParameters,
+) -> NDArray[np.int16]:
+    """Line 7's growth from seeds to pixels, in the view of t-1: 1 + motion, 0 = stands still."""
+    if parameters.growth.kind == "motion":
+        return label_by_motion(
+            pair, above_0.mask, motions, parameters.noise, above_0.depth_noise, parameters.growth
+        )
+    if parameters.growth.kind != "flow":
+        raise ValueError(f"no growth {parameters.growth.kind!r}: choose motion or flow")
+    X_t = effective_flow(optical_flow, expected_flow)
+    with np.errstate(invalid="ignore"):
+        moving = above_0.mask & ((X_t**2).sum(-1) > parameters.growth.flow_min**2)
+    return grow_by_similar_flow(X_t, moving, groups, parameters.growth.similar_flow)
+
+
+def _decide(
+    now: Segmentation,
+    pair: FramePair,
+    groups: BFIFGroups,
+    motions: NDArray[np.float64],
+    moving: NDArray[np.int16],
+    above_0: AboveTable,
+    parameters: SegmentParameters,
+) -> Segmentation:
+    """Labels at the reference frame in the light of what moves."""
+    if not len(motions):
+        return replace(now, decided=now.known.label, motion_of={})
+    if parameters.ids == "fresh":
+        fresh = np.where(moving > 0, moving + (now.next_id - 1), 0).astype(np.uint16)
+        ids = [int(a) for a in np.unique(fresh[fresh > 0])]
+        return replace(
+            now,
+            decided=np.where(moving > 0, fresh, now.known.label),
+            motion_of={a: motions[a - now.next_id] for a in ids},
+            born={**now.born, **dict.fromkeys(ids, now.episode)},
+            next_id=max([now.next_id - 1, *ids]) + 1,
+        )
+    z = pair.reference.depth[above_0.mask]
+    pixels_per_metre = pair.current.intrinsics.fx / float(np.median(z[z > 0]))
+    association = associate(
+        now.known,
+        moving,
+        now.decided if now.sequence > now.reference_sequence else None,
+        motion_gaps(_points(groups, pair, above_0), motions, pair.current.intrinsics.fx),
+        now.episode,
+        pixels_per_metre,
+        parameters.association,
+    )
+    return replace(
+        now,
+        decided=association.label,
+        motion_of={a: motions[g] for a, g in association.motion_of.items()},
+        born=association.born,
+        next_id=max(association.next_id, now.next_id),
+    )
+
+
+def _points(groups: BFIFGroups, pair: FramePair, above_0: AboveTable) -> NDArray[np.float64]:
+    """Points [N, 3] on what moves, or if no group says what, on all that stands on the table."""
+    if len(groups.p_C0Q):
+        return groups.p_C0Q
+    p_C0Q = back_project(pair.reference.depth, pair.reference.intrinsics)[above_0.mask]
+    return p_C0Q[p_C0Q[:, 2] > 0][::50].astype(float)

@@ -1,0 +1,79 @@
+from dataclasses import dataclass, field
+
+import pytest
+
+from riseg_drake.app.scenario_file import ScenarioError, parse_scenario, read_scenario
+
+
+@dataclass
+class Camera:
+    rate: float = 15.0
+    noise: bool = True
+
+
+@dataclass
+class Scene:
+    camera: Camera = field(default_factory=Camera)
+    objects: int = 4
+    name: str = "built-in"
+    centre: list[float] = field(default_factory=lambda: [0.5, 0.0])
+    limit: float | None = None
+
+
+def parse(text):
+    return parse_scenario(text, Scene, source="scene.yaml")
+
+
+def test_absent_keys_keep_their_defaults():
+    scene = parse("camera: {rate: 30}\nlimit: 1e-3")
+    assert scene == Scene(camera=Camera(rate=30.0), limit=0.001)
+
+
+@pytest.mark.parametrize("text", ["", "# only a comment\n", "{}"])
+def test_an_empty_file_is_all_defaults(text):
+    assert parse(text) == Scene()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("objetcs: 4", "scene.yaml: line 1: unknown key 'objetcs'; did you mean 'objects'?"),
+        (
+            "objects: 4\ncamera:\n  xyz: 1",
+            "scene.yaml: line 3: unknown key 'camera.xyz'; the keys here are rate, noise",
+        ),
+        ("camera: {rate: fast}", "scene.yaml: line 1: camera.rate must be a number, not 'fast'"),
+        ("camera: {rate: .nan}", "scene.yaml: line 1: camera.rate must be a number, not '.nan'"),
+        ("objects: 4.5", "scene.yaml: line 1: objects must be a whole number, not '4.5'"),
+        ("camera: {noise: 1}", "scene.yaml: line 1: camera.noise must be true or false, not '1'"),
+        ("name: 3", "scene.yaml: line 1: name must be a text, not '3'"),
+        ("centre: 3", "scene.yaml: line 1: centre must be a list, such as [1, 2], not '3'"),
+        ("centre: [1, x]", "scene.yaml: line 1: centre[1] must be a number, not 'x'"),
+        ("camera: 3", "scene.yaml: line 1: camera must be a block of keys (rate, noise), not '3'"),
+        ("- 1", "scene.yaml: line 1: the scenario must be a block of keys"),
+        ("a: [1", "scene.yaml: line 1: not YAML"),
+    ],
+)
+def test_an_error_says_in_one_line_where_it_is_and_what_would_have_been_right(text, message):
+    with pytest.raises(ScenarioError) as error:
+        parse(text)
+    assert str(error.value).startswith(message)
+    assert "\n" not in str(error.value)
+
+
+def test_a_missing_file_is_named_with_its_nearest_neighbour(tmp_path):
+    (tmp_path / "simulation.yaml").write_text("")
+    with pytest.raises(
+        ScenarioError, match=r"simulatoin.yaml is not there; did you mean .*simulation.yaml\?"
+    ):
+        read_scenario(tmp_path / "simulatoin.yaml", Scene)
+    with pytest.raises(ScenarioError, match="nor is the folder"):
+        read_scenario(tmp_path / "nowhere" / "x.yaml", Scene)
+
+
+def test_a_file_that_is_no_text_is_refused(tmp_path):
+    (tmp_path / "x.yaml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ScenarioError, match="not a readable text file"):
+        read_scenario(tmp_path / "x.yaml", Scene)
+    with pytest.raises(ScenarioError, match="not a readable text file"):
+        read_scenario(tmp_path, Scene)

@@ -1,0 +1,94 @@
+import ast
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "riseg_drake"
+
+FLOORS = {
+    "geometry": 0,
+    "robot": 1,
+    "segmentation": 2,
+    "pushing": 2,
+    "evaluation": 2,
+    "recording": 2,
+    "systems": 3,
+    "stations": 4,
+    "app": 5,
+}
+FILES = [path for path in sorted(PACKAGE.rglob("*.py")) if path.parent != PACKAGE]
+NOT_A_NOUN = {"utils", "util", "common", "helpers", "helper", "misc", "tools", "lib"}
+LONGEST = 350
+
+
+def name(path):
+    return str(path.relative_to(PACKAGE))
+
+
+def room(path):
+    return path.relative_to(PACKAGE).parts[0]
+
+
+def imports(path):
+    """The full names of all modules that a file imports, wherever in the file it does."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{name(path)} imports relatively"
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def test_every_room_has_its_floor():
+    assert {room(path) for path in FILES} == set(FLOORS)
+
+
+@pytest.mark.parametrize("path", FILES, ids=name)
+def test_imports_point_down_only(path):
+    own = room(path)
+    for module in imports(path):
+        package, _, rest = module.partition(".")
+        other = rest.split(".")[0]
+        if package == "riseg_drake" and other in FLOORS and other != own:
+            assert FLOORS[other] < FLOORS[own], f"{own} must not import {module}"
+
+
+@pytest.mark.parametrize("path", FILES, ids=name)
+def test_nothing_below_systems_knows_the_systems_framework(path):
+    if FLOORS[room(path)] < FLOORS["systems"]:
+        assert not [module for module in imports(path) if module.startswith("pydrake.systems")]
+
+
+@pytest.mark.parametrize("path", FILES, ids=name)
+def test_pydrake_is_imported_by_name(path):
+    assert not [module for module in imports(path) if module.startswith("pydrake.all")]
+
+
+@pytest.mark.parametrize("path", FILES, ids=name)
+def test_a_file_has_a_noun_for_its_name_and_a_length_that_can_be_read(path):
+    assert path.stem not in NOT_A_NOUN
+    assert len(path.read_text().splitlines()) <= LONGEST
+
+
+def test_the_floor_of_geometry_stands_on_numpy_and_scipy_alone():
+    allowed = {
+        "numpy",
+        "scipy",
+        "riseg_drake",
+        "dataclasses",
+        "functools",
+        "math",
+        "typing",
+        "collections",
+    }
+    for path in FILES:
+        if room(path) == "geometry":
+            assert {module.split(".")[0] for module in imports(path)} <= allowed
+
+
+def test_the_test_rooms_mirror_the_package():
+    tests = Path(__file__).parent
+    assert {path.name for path in tests.iterdir() if path.is_dir() and path.name[0] not in "._"} <= set(
+        FLOORS
+    )
