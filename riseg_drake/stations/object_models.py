@@ -109,7 +109,9 @@ def measure(name: str, path: Path) -> ObjectModel:
     p_BF = R_WB.inverse().multiply(feet.T).T if len(feet) else feet
     if len(feet):
         outline = Footprint(outline.pieces, float(feet[:, 2].min()) - FOOT_RADIUS)
-    friction = inspector.GetProximityProperties(geometries[0]).GetProperty("material", "coulomb_friction")
+    surface = inspector.GetProximityProperties(geometries[0]).GetProperty("material", "coulomb_friction")
+    # A copy: what the inspector hands out dies with the scene graph.
+    friction = CoulombFriction(surface.static_friction(), surface.dynamic_friction())
     return ObjectModel(name, path, X_WB, outline, p_BF, friction)
 
 

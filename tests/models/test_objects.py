@@ -94,8 +94,8 @@ def test_mass_and_inertia_are_those_of_the_solid_inside_the_mesh(model):
     volume = CalcSpatialInertia(mesh, 1.0).get_mass()
     expected = CalcSpatialInertia(mesh, inertia.get_mass() / volume)
     assert inertia.IsPhysicallyValid()
-    assert 0.035 < inertia.get_mass() < 0.2
-    assert 300 <= inertia.get_mass() / volume <= 900
+    assert 0.040 < inertia.get_mass() < 0.2
+    assert 299.5 < inertia.get_mass() / volume < 900.5  # wood to solid rubber; the files are rounded
     np.testing.assert_allclose(inertia.get_com(), expected.get_com(), atol=5e-5)
     scale = np.trace(expected.CopyToFullMatrix6()[:3, :3])
     np.testing.assert_allclose(
