@@ -45,9 +45,7 @@ def depth_std(depth: NDArray, noise: SensorNoise) -> NDArray:
     return depth * depth * np.float32(noise.disparity_std / (noise.focal_length * noise.baseline))
 
 
-def noisy_color(
-    color: NDArray[np.uint8], noise: SensorNoise, rng: np.random.Generator
-) -> NDArray[np.uint8]:
+def noisy_color(color: NDArray[np.uint8], noise: SensorNoise, rng: np.random.Generator) -> NDArray[np.uint8]:
     """Colour [H, W, 3] as the sensor reports it, saturating at 0 and 255."""
     if not noise.enabled or noise.color_std == 0:
         return color
@@ -95,9 +93,7 @@ def _edges(depth: NDArray[np.float32], step: float) -> NDArray[np.bool_]:
     return cv2.morphologyEx(depth, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8)) > step
 
 
-def _correlated_normal(
-    shape: tuple[int, ...], width: float, rng: np.random.Generator
-) -> NDArray[np.float32]:
+def _correlated_normal(shape: tuple[int, ...], width: float, rng: np.random.Generator) -> NDArray[np.float32]:
     """Normal noise of unit variance [H, W] that is alike over `width` px."""
     table = _normal_quantiles().astype(np.float32)
     white = np.asarray(cv2.LUT(_random_bytes(shape, rng), table), np.float32)
@@ -106,9 +102,7 @@ def _correlated_normal(
     size = 2 * int(np.ceil(3 * width)) + 1
     kernel = cv2.getGaussianKernel(size, width)
     # Blurring with weights k (x) k leaves the standard deviation sum k^2.
-    return np.multiply(
-        cv2.GaussianBlur(white, (size, size), width), 1 / np.sum(kernel**2), dtype=np.float32
-    )
+    return np.multiply(cv2.GaussianBlur(white, (size, size), width), 1 / np.sum(kernel**2), dtype=np.float32)
 
 
 def _drawn(share: float, shape: tuple[int, ...], rng: np.random.Generator) -> NDArray[np.bool_]:

@@ -19,7 +19,7 @@ from pydrake.geometry import (
     RenderCameraCore,
     RenderEngineVtkParams,
     Rgba,
-    RoleAssign,
+    Role,
     SceneGraph,
 )
 from pydrake.math import RigidTransform
@@ -127,7 +127,9 @@ class SimulatedStation(Diagram):
         for instance in (panda.arm, panda.pusher):
             plant.set_gravity_enabled(instance, False)
         _add_table(plant, scene_graph, config.table)
-        self.objects = list(objects or draw_scene(config.scene, np.random.default_rng(seed)))
+        if objects is None:
+            objects = draw_scene(config.scene, np.random.default_rng(seed))
+        self.objects = list(objects)
         """The scene as it was at the start; object id i + 1 is `objects[i]`."""
         self.object_bodies = add_scene(plant, self.objects)
         """Index of the body of each object id."""
@@ -195,9 +197,7 @@ def start_position(config: SimulatedStationConfig) -> list[float]:
             raise ValueError(f"start_position: {len(config.start_position)} angles; expected 7, in rad")
         return config.start_position
     kinematics = PandaKinematics(config.panda)
-    q = kinematics.solve_ik(
-        observe_pose([*config.scene.centre_W, 0.0], config.observe_height, kinematics.X_EC)
-    )
+    q = kinematics.solve_ik(observe_pose([*config.scene.centre_W, 0.0], config.observe_height, kinematics.X_EC))
     if q is None:
         raise ValueError(
             f"observe_height: no posture looks at {config.scene.centre_W} from {config.observe_height} "
@@ -226,12 +226,17 @@ def _add_table(plant: MultibodyPlant, scene_graph: SceneGraph, config: TableConf
         return
     if config.texture and not Path(config.texture).is_file():
         raise ValueError(f"table texture: no file {config.texture}; expected a PNG or JPEG image")
+    source = plant.get_source_id()
     for geometry in plant.GetVisualGeometriesForBody(body):
-        for properties in (PerceptionProperties(), IllustrationProperties()):
-            properties.AddProperty("phong", "diffuse", Rgba(*(config.color or [1.0, 1.0, 1.0])))
-            if config.texture:
-                properties.AddProperty("phong", "diffuse_map", config.texture)
-            if isinstance(properties, PerceptionProperties):
-                old = scene_graph.model_inspector().GetPerceptionProperties(geometry)
-                properties.AddProperty("label", "id", old.GetProperty("label", "id"))
-            scene_graph.AssignRole(plant.get_source_id(), geometry, properties, RoleAssign.kReplace)
+        old = scene_graph.model_inspector().GetPerceptionProperties(geometry)
+        looks = PerceptionProperties()
+        looks.AddProperty("label", "id", old.GetProperty("label", "id"))
+        looks.AddProperty("phong", "diffuse", Rgba(*(config.color or [1.0, 1.0, 1.0])))
+        # Taken off and put on again, since what cameras see cannot be replaced in one go.
+        for role in (Role.kPerception, Role.kIllustration):
+            scene_graph.RemoveRole(source, geometry, role)
+        # Meshcat draws no texture on a box: it shows the colour alone.
+        scene_graph.AssignRole(source, geometry, IllustrationProperties(looks))
+        if config.texture:
+            looks.AddProperty("phong", "diffuse_map", config.texture)
+        scene_graph.AssignRole(source, geometry, looks)

@@ -84,9 +84,7 @@ class WristCamera(LeafSystem):
         seen = self._color_in.Eval(context).data
         color.mutable_data[:] = seen
         color.mutable_data[..., :3] = noisy_color(np.ascontiguousarray(seen[..., :3]), self._noise, rng)
-        measured = noisy_depth(
-            sanitize_depth(self._depth_in.Eval(context).data[..., 0]), self._noise, rng
-        )
+        measured = noisy_depth(sanitize_depth(self._depth_in.Eval(context).data[..., 0]), self._noise, rng)
         nearest, farthest = self._depth_range
         depth.mutable_data[..., 0] = measured * ((measured >= nearest) & (measured <= farthest))
         stamp.set_value([context.get_time(), number])

@@ -7,6 +7,7 @@ from pydrake.systems.analysis import Simulator
 from riseg_drake.geometry.camera import back_project
 from riseg_drake.robot.kinematics import PandaKinematics, tip_pointing_down
 from riseg_drake.stations.contract import check_contract
+from riseg_drake.stations.object_models import measure
 from riseg_drake.stations.scene import PlacedObject
 from riseg_drake.stations.simulated import SimulatedStation, SimulatedStationConfig, start_position
 
@@ -18,6 +19,7 @@ BOX_SDF = """<sdf version="1.9"><model name="box"><link name="box">
     <material><diffuse>{color} 1</diffuse></material></visual>
   <collision name="c"><geometry><box><size>0.06 0.06 0.04</size></box></geometry></collision>
 </link></model></sdf>"""
+TURN = np.array([0.15, 0, 0, 0, 0, 0, 0])
 CENTRES = ((0.46, -0.05), (0.54, 0.06))
 
 
@@ -28,8 +30,7 @@ def boxes(tmp_path_factory):
     for number, (x, y) in enumerate(CENTRES):
         path = folder / f"box{number}.sdf"
         path.write_text(BOX_SDF.format(color=["0.8 0.2 0.1", "0.1 0.3 0.8"][number]))
-        X_WB = RigidTransform([x, y, 0.02])
-        placed.append(PlacedObject(f"box{number}", path, X_WB, np.empty((0, 3))))
+        placed.append(PlacedObject(measure(path.stem, path), RigidTransform([x, y, 0.02])))
     return placed
 
 
@@ -118,7 +119,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_other_noise(boxes):
 def test_pictures_are_held_between_camera_ticks_and_taken_at_the_camera_rate(boxes):
     run = Run(boxes).advance(0.0)
     times, pictures = set(), set()
-    for time in np.arange(0.0, 0.21, 0.01):
+    for time in np.arange(0.0, 0.215, 0.01):
         run.advance(time)
         times.add(round(float(run["wrist.image_time"][0]), 4))
         pictures.add(run["wrist.depth_image"].tobytes() + run["wrist.color_image"].tobytes())
@@ -130,12 +131,12 @@ def test_colour_and_depth_show_the_instant_of_image_time_while_the_arm_moves(box
     config = SimulatedStationConfig()
     config.camera.noise.enabled = False
     run = Run(boxes, config=config).advance(0.01)
-    run.command(run.start + [0.15, 0, 0, 0, 0, 0, 0])
+    run.command(run.start + TURN)
     run.advance(1.5 / 15)
     held = {name: run[f"wrist.{name}"] for name in ("color_image", "depth_image")}
     # What an ideal camera shows with the joint angles read right after image_time.
     again = Run(boxes, config=config).advance(0.01)
-    again.command(run.start + [0.15, 0, 0, 0, 0, 0, 0])
+    again.command(run.start + TURN)
     again.advance(float(run["wrist.image_time"][0]) + 0.001)
     np.testing.assert_array_equal(held["color_image"], again["cheat.color_image"])
     np.testing.assert_array_equal(held["depth_image"], again["wrist.depth_image"])
@@ -146,9 +147,7 @@ def test_colour_and_depth_show_the_instant_of_image_time_while_the_arm_moves(box
 def test_a_commanded_motion_is_followed_within_a_millimetre_at_the_tip(boxes):
     run = Run(boxes[:1])
     kinematics = PandaKinematics()
-    path = [
-        tip_pointing_down([0.38 + 0.04 * s, -0.04 * s, 0.15], 0.3 * s) for s in np.linspace(0, 1, 101)
-    ]
+    path = [tip_pointing_down([0.38 + 0.04 * s, -0.04 * s, 0.15], 0.3 * s) for s in np.linspace(0, 1, 101)]
     targets = kinematics.trace_ik(path, run.start)
     worst = 0.0
     for number, q in enumerate(targets):
