@@ -63,8 +63,8 @@ def add_panda(plant: MultibodyPlant, description: PandaDescription) -> PandaPart
         package_xml = Path(description.drake_models) / "package.xml"
         if not package_xml.is_file():
             raise ValueError(
-                f"drake_models: {description.drake_models} has no package.xml; name the folder of a copy "
-                "of RobotLocomotion/models, or leave it empty"
+                f"drake_models: {description.drake_models} has no package.xml; name the folder of a "
+                "copy of RobotLocomotion/models, or leave it empty"
             )
         parser.package_map().Remove("drake_models")
         parser.package_map().AddPackageXml(str(package_xml))

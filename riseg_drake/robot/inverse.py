@@ -74,8 +74,8 @@ def panda_postures(X_WF: NDArray, q7: NDArray) -> NDArray[np.float64]:
 def _shoulder_and_wrist(
     R_W4: NDArray, q4: NDArray, x_6: NDArray, z_6: NDArray, q7: NDArray, reachable: NDArray
 ) -> list[NDArray]:
-    """The two postures of the shoulder for a known frame 4, each [N, 7] with unreachable rows left out."""
-    # Joint 5 turns about y_4, R_45 = Rx(-90 deg) Rz(q5), and z_6 = -y_5; joint 6: R_56 = Rx(90 deg) Rz(q6).
+    """The two postures of the shoulder for a known frame 4, each [N, 7] without unreachable rows."""
+    # Joint 5 turns about y_4, R_45 = Rx(-90 deg) Rz(q5); joint 6: R_56 = Rx(90 deg) Rz(q6), z_6 = -y_5.
     z_6_in_4 = np.einsum("nji,nj->ni", R_W4, z_6)
     q5 = np.arctan2(z_6_in_4[:, 0], z_6_in_4[:, 2])
     x_5 = np.cos(q5)[:, None] * R_W4[:, :, 0] - np.sin(q5)[:, None] * R_W4[:, :, 2]

@@ -20,14 +20,14 @@ MIN_CLEARANCE = 0.003
 """Room that solutions keep between arm, tool and table, m."""
 
 READY = np.array([0.0, -0.1, 0.0, -2.4, 0.0, 2.3, 0.0])
-"""An elbow-up posture in the middle of the arm's room, tool pointing down, rad; where a search starts."""
+"""An elbow-up posture amid the joints' ranges, tool pointing down, rad; where a search starts."""
 
 _FREE_ANGLES = np.linspace(PANDA_LIMITS.position_lower[6], PANDA_LIMITS.position_upper[6], 181)
 _TABLE_SIZE = (4.0, 4.0, 1.0)
 
 
 def tip_pointing_down(p_WE: Sequence[float] | NDArray, yaw: float) -> NDArray[np.float64]:
-    """X_WE [4, 4] with the tip at p_WE, the tool upright, and E's x axis (the push) at `yaw` about W's z."""
+    """X_WE [4, 4]: the tip at p_WE, the tool upright, the push (E's x axis) at `yaw` about W's z."""
     c, s = np.cos(yaw), np.sin(yaw)
     X_WE = np.eye(4)
     X_WE[:3, :3] = np.array([[c, s, 0], [s, -c, 0], [0, 0, -1]])
@@ -107,12 +107,12 @@ class PandaKinematics:
         Negative where they penetrate; `reach` where nothing is nearer than that.
         """
         self.plant.SetPositions(self._context, q)
-        query = self.plant.get_geometry_query_input_port().Eval(self._diagram.plant_context(self._root))
+        query = self.plant.get_geometry_query_input_port().Eval(self._context)
         pairs = query.ComputeSignedDistancePairwiseClosestPoints(reach)
         return min((pair.distance for pair in pairs), default=reach)
 
     def postures(self, X_WE: NDArray, margin: float = LIMIT_MARGIN) -> NDArray[np.float64]:
-        """A dense sample [N, 7] of the postures with the tip at X_WE [4, 4], within limits by `margin` rad."""
+        """A dense sample [N, 7] of postures with the tip at X_WE [4, 4], `margin` rad inside limits."""
         q = panda_postures(X_WE @ self.X_EF, _FREE_ANGLES)
         return q[(PANDA_LIMITS.room(q) >= margin).all(axis=1)]
 
@@ -123,7 +123,7 @@ class PandaKinematics:
         margin: float = LIMIT_MARGIN,
         min_clearance: float = MIN_CLEARANCE,
     ) -> NDArray[np.float64] | None:
-        """Joint angles [7] with the tip exactly at X_WE [4, 4], free of collision; None where there are none.
+        """Joint angles [7] with the tip exactly at X_WE [4, 4], free of collision, or None.
 
         Of all such postures the one nearest to q_near [7] is taken (largest joint difference), with some
         liking for room to the joints' limits.
@@ -142,9 +142,9 @@ class PandaKinematics:
         margin: float = LIMIT_MARGIN,
         min_clearance: float = MIN_CLEARANCE,
     ) -> list[NDArray[np.float64]] | None:
-        """Joint angles [7] for every pose X_WE [4, 4] of a path, without a jump, from a posture near its first.
+        """Joint angles [7] for poses X_WE [4, 4] of a path, without a jump; q_start is near the first.
 
-        Newton steps on the pose; the spare freedom is spent on staying away from the joints' limits. None
+        Newton steps on the pose; the spare freedom is spent on staying off the joints' limits. None
         where the path leaves the limits by `margin`, touches something, or cannot be followed. Poses
         should be no more than some 2 cm or 0.1 rad apart.
         """
@@ -173,7 +173,7 @@ class PandaKinematics:
             J_pinv = J.T @ np.linalg.solve(J @ J.T + 1e-8 * np.eye(6), np.eye(6))
             dq = J_pinv @ error
             if iteration == 0:
-                # Grows steeply near a limit; its share of the step is bounded so that the path stays smooth.
+                # Grows steeply near a limit; bounded by the step itself, so that the path stays smooth.
                 crowding = ((q - PANDA_LIMITS.position_middle) / half_range) ** 5 / half_range
                 away = -(crowding - J_pinv @ (J @ crowding))
                 dq += 0.3 * np.linalg.norm(error) * np.clip(away, -1, 1)
@@ -182,7 +182,7 @@ class PandaKinematics:
 
 
 def pose_error(X_WA: NDArray, X_WB: NDArray) -> NDArray[np.float64]:
-    """The small twist [omega; p] [6], expressed in W, that carries A onto B (to first order in the angle)."""
+    """The small twist [omega; p] [6] in W that carries A onto B, to first order in the angle."""
     R_AB_W = X_WB[:3, :3] @ X_WA[:3, :3].T
     twisting = np.array(
         [R_AB_W[2, 1] - R_AB_W[1, 2], R_AB_W[0, 2] - R_AB_W[2, 0], R_AB_W[1, 0] - R_AB_W[0, 1]]
@@ -200,5 +200,5 @@ def observe_pose(
     """
     X_WE = tip_pointing_down(np.zeros(3), yaw)
     p_EC_W = X_WE[:3, :3] @ X_EC[:3, 3]
-    X_WE[:3, 3] = np.asarray(p_WT, np.float64) + [0, 0, height] - p_EC_W
+    X_WE[:3, 3] = np.add(p_WT, [0, 0, height]) - p_EC_W
     return X_WE

@@ -19,7 +19,7 @@ _SUBPIXEL_BITS = 4
 
 @dataclass(frozen=True)
 class _Hull:
-    """A convex piece of a body: its corners [N, 3] in the body's frame, and the edges [M, 2] between them."""
+    """A convex piece of a body: corners [N, 3] in the body's frame, and the edges [M, 2] between."""
 
     body: RigidBody
     corners: NDArray[np.float64]
@@ -42,9 +42,8 @@ class RobotSilhouette:
     ):
         self._kinematics = kinematics
         self._intrinsics = intrinsics
-        self._margin_m = margin_m
         self._margin_px = margin_px
-        self._hulls = _visible_hulls(kinematics)
+        self._hulls = _visible_hulls(kinematics, margin_m)
 
     def mask(self, q: NDArray) -> NDArray[np.bool_]:
         """True where the robot at joint angles q [7] is in the way, [H, W]."""
@@ -66,12 +65,12 @@ class RobotSilhouette:
         k = self._intrinsics
         z = p_CQ[:, 2]
         uv = np.stack([p_CQ[:, 0] / z * k.fx + k.cx, p_CQ[:, 1] / z * k.fy + k.cy], axis=-1)
-        margin = self._margin_px + self._margin_m * k.fx / z.min()
+        margin = self._margin_px
         if (uv.max(axis=0) < -margin).any() or (
             uv.min(axis=0) > (k.width + margin, k.height + margin)
         ).any():
             return
-        # Far outside the picture a coordinate would overflow; at that distance only its direction counts.
+        # Far outside the picture a coordinate would overflow; out there only its direction counts.
         uv = np.clip(uv, -20 * k.width, 20 * k.width)
         outline = cv2.convexHull(np.round(uv * (1 << _SUBPIXEL_BITS)).astype(np.int32))
         cv2.fillConvexPoly(image, outline, 1, shift=_SUBPIXEL_BITS)
@@ -79,7 +78,7 @@ class RobotSilhouette:
 
 
 def _ahead_of_camera(p_CQ: NDArray, edges: NDArray) -> NDArray | None:
-    """The part of a convex body at z >= NEAR: its corners there and where its edges pierce that plane."""
+    """The part of a convex body at z >= NEAR: corners there, and where edges pierce that plane."""
     z = p_CQ[:, 2]
     if z.max() <= NEAR:
         return None
@@ -91,7 +90,7 @@ def _ahead_of_camera(p_CQ: NDArray, edges: NDArray) -> NDArray | None:
     return np.concatenate([p_CQ[z >= NEAR], start + share[:, None] * (end - start)])
 
 
-def _visible_hulls(kinematics: PandaKinematics) -> list[_Hull]:
+def _visible_hulls(kinematics: PandaKinematics, margin: float) -> list[_Hull]:
     plant, inspector = kinematics.plant, kinematics.inspector
     hulls = []
     for instance in (kinematics.parts.arm, kinematics.parts.pusher):
@@ -99,12 +98,24 @@ def _visible_hulls(kinematics: PandaKinematics) -> list[_Hull]:
             body = plant.get_body(body_index)
             frame = plant.GetBodyFrameIdOrThrow(body_index)
             for geometry in inspector.GetGeometries(frame, Role.kPerception):
-                points = _corners(inspector.GetShape(geometry))
-                hull = ConvexHull(points)
-                edges = np.concatenate([hull.simplices[:, [i, (i + 1) % 3]] for i in range(3)])
+                corners, edges = _grown(_corners(inspector.GetShape(geometry)), margin)
                 X_BG = inspector.GetPoseInFrame(geometry)
-                hulls.append(_Hull(body, (X_BG @ points.T).T, np.unique(np.sort(edges, axis=1), axis=0)))
+                hulls.append(_Hull(body, (X_BG @ corners.T).T, edges))
     return hulls
+
+
+def _grown(points: NDArray, margin: float) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Corners [N, 3] and edges [M, 2] of the convex hull of points, every face moved out by `margin`."""
+    hull = ConvexHull(points)
+    corners = points[hull.vertices]
+    triangles = np.searchsorted(np.sort(hull.vertices), hull.simplices)
+    triangles = np.argsort(hull.vertices)[triangles]
+    edges = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
+    moved = np.empty_like(corners)
+    for i, corner in enumerate(corners):
+        normals = np.unique(hull.equations[(triangles == i).any(axis=1), :3].round(6), axis=0)
+        moved[i] = corner + np.linalg.lstsq(normals, np.full(len(normals), margin), rcond=0.1)[0]
+    return moved, np.unique(np.sort(edges, axis=1), axis=0)
 
 
 def _corners(shape: Shape) -> NDArray[np.float64]:

@@ -4,13 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import SceneGraph, Sphere
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import PackageMap, Parser
-from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 from scipy.spatial import ConvexHull
 
@@ -37,6 +38,8 @@ class ObjectModel:
     """Of the body in its modelled pose, about its origin."""
     feet: NDArray
     """Centres p_BF [k, 3] of balls to be added below a flat underside; none where it needs none."""
+    foot_friction: CoulombFriction
+    """Of those balls: that of the geometry they stand for."""
 
 
 def find_models(folder_or_url: str, names: Sequence[str] = ()) -> list[ObjectModel]:
@@ -64,13 +67,13 @@ def find_models(folder_or_url: str, names: Sequence[str] = ()) -> list[ObjectMod
     return [measure(name, paths[name]) for name in sorted(names or paths)]
 
 
-def parse_body(plant: MultibodyPlant, name: str, path: Path) -> RigidBody:
-    """Add a model of one body to a plant under a name of its own. Raises SceneError."""
+def parse_body(plant: MultibodyPlant, path: Path) -> RigidBody:
+    """Add a model of one body to a plant, renamed where its name is taken. Raises SceneError."""
     parser = Parser(plant)
     parser.SetAutoRenaming(True)
-    parser.package_map().Add("riseg_drake_models", str(files("riseg_drake.models")))
+    parser.package_map().Add("riseg_drake_models", Path(str(files("riseg_drake.models"))))
     try:
-        instances = parser.AddModels(str(path))
+        instances = parser.AddModels(path)
     except RuntimeError as error:
         raise SceneError(f"{path} cannot be read: {' '.join(str(error).split())}") from error
     bodies = [
@@ -86,7 +89,7 @@ def measure(name: str, path: Path) -> ObjectModel:
     scene_graph = SceneGraph()
     plant = MultibodyPlant(0.002)
     plant.RegisterAsSourceForSceneGraph(scene_graph)
-    body = parse_body(plant, name, path)
+    body = parse_body(plant, path)
     plant.Finalize()
     if not body.is_floating_base_body():
         raise SceneError(f"{path} is fixed to the world; an object of a scene must be free to move")
@@ -99,7 +102,7 @@ def measure(name: str, path: Path) -> ObjectModel:
         raise SceneError(f"{path} has no collision geometry; without it nothing can push the object")
     inspector = scene_graph.model_inspector()
     R_WB = plant.GetDefaultFloatingBaseBodyPose(body).rotation()
-    X_WB = RigidTransform(R_WB, np.zeros(3))
+    X_WB = RigidTransform(R_WB)
     try:
         outline = footprint(inspector, geometries, X_WB)
         lowest = [
@@ -113,7 +116,10 @@ def measure(name: str, path: Path) -> ObjectModel:
     p_BF = R_WB.inverse().multiply(feet.T).T if len(feet) else feet
     if len(feet):
         outline = Footprint(outline.pieces, float(feet[:, 2].min()) - FOOT_RADIUS)
-    return ObjectModel(name, path, X_WB, outline, p_BF)
+    friction: Any = inspector.GetProximityProperties(geometries[0]).GetProperty(
+        "material", "coulomb_friction"
+    )
+    return ObjectModel(name, path, X_WB, outline, p_BF, friction)
 
 
 def _feet(corners: NDArray, bottom: float) -> NDArray:
@@ -142,7 +148,7 @@ def _resolve(folder_or_url: str) -> Path:
         folder = Path(folder_or_url).expanduser()
     else:
         packages = PackageMap()
-        packages.Add("riseg_drake_models", str(files("riseg_drake.models")))
+        packages.Add("riseg_drake_models", Path(str(files("riseg_drake.models"))))
         try:
             folder = Path(packages.ResolveUrl(folder_or_url))
         except RuntimeError as error:

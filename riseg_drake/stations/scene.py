@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,13 +67,20 @@ class SceneConfig:
 
 @dataclass(frozen=True)
 class PlacedObject:
-    """One object of a scene, at rest."""
+    """One object of a scene."""
 
-    name: str
-    model_path: Path
+    model: ObjectModel
     X_WB: RigidTransform
-    feet: NDArray
-    """Centres p_BF [k, 3] of balls that are added below a flat underside (see object_models)."""
+
+    @property
+    def name(self) -> str:
+        """Name of the model, by its file."""
+        return self.model.name
+
+    @property
+    def model_path(self) -> Path:
+        """The SDF or URDF file."""
+        return self.model.path
 
 
 def draw_scene(config: SceneConfig, rng: np.random.Generator) -> list[PlacedObject]:
@@ -113,10 +121,14 @@ def add_scene(plant: MultibodyPlant, placed: Sequence[PlacedObject]) -> dict[int
     """
     bodies = {}
     for object_id, item in enumerate(placed, start=1):
-        body = parse_body(plant, item.name, item.model_path)
-        for k, p_BF in enumerate(item.feet):
+        body = parse_body(plant, item.model_path)
+        for k, p_BF in enumerate(item.model.feet):
             plant.RegisterCollisionGeometry(
-                body, RigidTransform(p_BF), Sphere(FOOT_RADIUS), f"added_foot_{k}", _foot_properties()
+                body,
+                RigidTransform(p_BF),
+                Sphere(FOOT_RADIUS),
+                f"added_foot_{k}",
+                _foot_properties(item.model.foot_friction),
             )
         plant.SetDefaultFloatingBaseBodyPose(body, item.X_WB)
         bodies[object_id] = body.index()
@@ -141,8 +153,10 @@ def settle(placed: Sequence[PlacedObject], config: SceneConfig) -> list[PlacedOb
     plant.set_contact_model(ContactModel.kPoint)
     plant.set_discrete_contact_approximation(DiscreteContactApproximation.kLagged)
     table = Box(4.0, 4.0, 0.5)
-    X_WT = RigidTransform([config.centre_W[0], config.centre_W[1], -0.25])
-    plant.RegisterCollisionGeometry(plant.world_body(), X_WT, table, "table", TABLE_FRICTION)
+    p_WT: Any = np.array([*config.centre_W, -0.25])  # the stubs know no array type that fits
+    plant.RegisterCollisionGeometry(
+        plant.world_body(), RigidTransform(p_WT), table, "table", TABLE_FRICTION
+    )
     bodies = [plant.get_body(index) for index in add_scene(plant, placed).values()]
     plant.Finalize()
     simulator = Simulator(builder.Build())
@@ -156,7 +170,7 @@ def settle(placed: Sequence[PlacedObject], config: SceneConfig) -> list[PlacedOb
         ):
             break
     return [
-        PlacedObject(item.name, item.model_path, body.EvalPoseInWorld(context), item.feet)
+        PlacedObject(item.model, body.EvalPoseInWorld(context))
         for item, body in zip(placed, bodies, strict=True)
     ]
 
@@ -250,17 +264,16 @@ def _centred(
 
 def _stand(model: ObjectModel, yaw: float, p_xy: NDArray) -> PlacedObject:
     """A model turned by `yaw` about the vertical, its lowest point a little above the table."""
-    height = -model.footprint.bottom + DROP
-    X_WB = RigidTransform(
-        RotationMatrix.MakeZRotation(yaw).multiply(model.X_WB.rotation()), [p_xy[0], p_xy[1], height]
-    )
-    return PlacedObject(model.name, model.path, X_WB, model.feet)
+    R_WB = RotationMatrix.MakeZRotation(yaw).multiply(model.X_WB.rotation())
+    p_WB: Any = np.array([*p_xy, DROP - model.footprint.bottom])
+    X_WB = RigidTransform(R_WB, p_WB)
+    return PlacedObject(model, X_WB)
 
 
 def _restless(placed: Sequence[PlacedObject], settled: Sequence[PlacedObject]) -> str:
     """What is wrong with a settled scene: an object that fell over, rolled away or sank; or nothing."""
     for before, after in zip(placed, settled, strict=True):
-        shift = np.linalg.norm(after.X_WB.translation() - before.X_WB.translation())
+        shift = np.linalg.norm(np.subtract(after.X_WB.translation(), before.X_WB.translation()))
         angle = (before.X_WB.rotation().inverse().multiply(after.X_WB.rotation())).ToAngleAxis().angle()
         if shift > 0.005 or angle > np.radians(3.0):
             return (
@@ -270,9 +283,7 @@ def _restless(placed: Sequence[PlacedObject], settled: Sequence[PlacedObject]) -
     return ""
 
 
-def _foot_properties() -> ProximityProperties:
+def _foot_properties(friction: CoulombFriction) -> ProximityProperties:
     properties = ProximityProperties()
-    AddContactMaterial(
-        dissipation=2.0, point_stiffness=2e4, friction=CoulombFriction(0.7, 0.7), properties=properties
-    )
+    AddContactMaterial(dissipation=2.0, point_stiffness=2e4, friction=friction, properties=properties)
     return properties

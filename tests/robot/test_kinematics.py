@@ -1,0 +1,90 @@
+import numpy as np
+import pytest
+from pydrake.math import RotationMatrix
+
+from riseg_drake.robot.kinematics import (
+    LIMIT_MARGIN,
+    MIN_CLEARANCE,
+    READY,
+    observe_pose,
+    pose_error,
+    tip_pointing_down,
+)
+from riseg_drake.robot.limits import PANDA_LIMITS
+
+
+@pytest.mark.parametrize("yaw", [-3.0, -1.2, 0.0, 0.7])
+def test_the_tip_pointing_down_pushes_along_its_yaw(yaw):
+    X_WE = tip_pointing_down([0.5, 0.1, 0.02], yaw)
+    np.testing.assert_allclose(X_WE[:3, 0], [np.cos(yaw), np.sin(yaw), 0])
+    np.testing.assert_allclose(X_WE[:3, 2], [0, 0, -1])
+    RotationMatrix(X_WE[:3, :3])  # raises for anything but a rotation
+
+
+def test_observing_looks_straight_down_at_the_point_from_the_height(panda):
+    X_WE = observe_pose([0.5, 0.0, 0.0], 0.5, panda.X_EC)
+    q = panda.solve_ik(X_WE)
+    X_WC = panda.X_WC(q)
+    np.testing.assert_allclose(X_WC[:3, 3], [0.5, 0, 0.5], atol=1e-9)
+    np.testing.assert_allclose(X_WC[:3, 2], [0, 0, -1], atol=1e-9)
+    assert panda.X_WE(q)[2, 3] == pytest.approx(0.15)
+
+
+def test_solutions_reach_the_pose_within_limits_and_free_of_collision(panda):
+    rng = np.random.default_rng(5)
+    found = 0
+    for _ in range(40):
+        p_WE = rng.uniform([0.35, -0.2, 0.005], [0.65, 0.2, 0.35])
+        X_WE = tip_pointing_down(p_WE, rng.uniform(-np.pi, np.pi))
+        q = panda.solve_ik(X_WE)
+        if q is None:
+            continue
+        found += 1
+        np.testing.assert_allclose(panda.X_WE(q), X_WE, atol=1e-9)
+        assert PANDA_LIMITS.contains(q, LIMIT_MARGIN)
+        assert panda.clearance(q) >= MIN_CLEARANCE
+    assert found >= 30  # towards the robot's own base the camera meets the wrist
+
+
+def test_a_pose_below_the_table_or_far_away_has_no_solution(panda):
+    assert panda.solve_ik(tip_pointing_down([0.5, 0, -0.02], 0.0)) is None
+    assert panda.solve_ik(tip_pointing_down([1.2, 0, 0.1], 0.0)) is None
+
+
+def test_the_solution_nearest_to_a_posture_is_that_posture(panda):
+    q = panda.solve_ik(tip_pointing_down([0.5, 0.1, 0.1], 0.6))
+    again = panda.solve_ik(panda.X_WE(q), q_near=q)
+    np.testing.assert_allclose(again, q, atol=0.05)
+
+
+def test_a_traced_path_is_exact_and_never_jumps(panda):
+    path = [tip_pointing_down([0.42 + 0.1 * s, 0.05 * s, 0.01], 0.5 + s) for s in np.linspace(0, 1, 21)]
+    traced = panda.trace_ik(path, panda.solve_ik(path[0]))
+    for q, X_WE in zip(traced, path, strict=True):
+        np.testing.assert_allclose(panda.X_WE(q), X_WE, atol=1e-5)
+    assert np.abs(np.diff(traced, axis=0)).max() < 0.15
+
+
+def test_a_path_into_the_table_is_refused(panda):
+    path = [tip_pointing_down([0.5, 0, z], 0.0) for z in np.linspace(0.03, -0.01, 9)]
+    assert panda.trace_ik(path, panda.solve_ik(path[0])) is None
+
+
+def test_clearance_above_the_table_is_the_height_of_the_tip(panda):
+    q = panda.solve_ik(tip_pointing_down([0.5, 0, 0.02], 0.0))
+    assert panda.clearance(q) == pytest.approx(0.02, abs=1e-6)
+    below = panda.solve_ik(tip_pointing_down([0.5, 0, -0.01], 0.0), min_clearance=-1.0)
+    assert panda.clearance(below) == pytest.approx(-0.01, abs=1e-6)
+
+
+def test_clearance_sees_the_arm_run_into_itself(panda):
+    folded = READY.copy()
+    folded[3] = PANDA_LIMITS.position_lower[3]
+    folded[5] = PANDA_LIMITS.position_lower[5]
+    assert panda.clearance(folded) < 0 < panda.clearance(READY)
+
+
+def test_the_jacobian_is_the_derivative_of_the_tip(panda):
+    q, dq = READY, 1e-6 * np.arange(1, 8)
+    V_WE = pose_error(panda.X_WE(q - dq / 2), panda.X_WE(q + dq / 2))
+    np.testing.assert_allclose(panda.tip_jacobian(q) @ dq, V_WE, atol=1e-11)

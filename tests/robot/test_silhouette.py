@@ -1,0 +1,104 @@
+import numpy as np
+import pytest
+from pydrake.geometry import (
+    ClippingRange,
+    DepthRange,
+    DepthRenderCamera,
+    MakeRenderEngineVtk,
+    RenderCameraCore,
+    RenderEngineVtkParams,
+)
+from pydrake.math import RigidTransform
+from pydrake.planning import RobotDiagramBuilder
+from pydrake.systems.sensors import CameraInfo, RgbdSensor
+
+from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.robot.description import PandaDescription, add_panda
+from riseg_drake.robot.kinematics import observe_pose, tip_pointing_down
+from riseg_drake.robot.silhouette import NEAR, RobotSilhouette
+
+D415 = Intrinsics(640, 480, 616.285, 615.778, 301.418, 232.864)
+
+
+@pytest.fixture(scope="module")
+def rendered_robot():
+    """A function q -> bool [H, W]: where Drake's label image shows the robot."""
+    builder = RobotDiagramBuilder(time_step=0.0)
+    plant, scene_graph = builder.plant(), builder.scene_graph()
+    frame = add_panda(plant, PandaDescription()).camera_frame
+    plant.Finalize()
+    scene_graph.AddRenderer("vtk", MakeRenderEngineVtk(RenderEngineVtkParams()))
+    k = D415
+    core = RenderCameraCore(
+        "vtk",
+        CameraInfo(k.width, k.height, k.fx, k.fy, k.cx, k.cy),
+        ClippingRange(NEAR, 5.0),
+        RigidTransform(),
+    )
+    sensor = builder.builder().AddSystem(
+        RgbdSensor(
+            plant.GetBodyFrameIdOrThrow(frame.body().index()),
+            frame.GetFixedPoseInBodyFrame(),
+            DepthRenderCamera(core, DepthRange(0.1, 4.0)),
+        )
+    )
+    builder.builder().Connect(scene_graph.get_query_output_port(), sensor.query_object_input_port())
+    diagram = builder.Build()
+    root = diagram.CreateDefaultContext()
+
+    def draw(q):
+        plant.SetPositions(diagram.mutable_plant_context(root), q)
+        image = sensor.label_image_output_port().Eval(sensor.GetMyContextFromRoot(root))
+        return image.data[..., 0] < 32766
+
+    return draw
+
+
+def postures(panda):
+    poses = [
+        observe_pose([0.5, 0, 0], 0.5, panda.X_EC),
+        tip_pointing_down([0.55, 0.0, 0.01], 1.0),
+        tip_pointing_down([0.36, 0.1, 0.2], 2.6),
+        tip_pointing_down([0.38, 0.0, 0.3], -2.4),
+    ]
+    return [panda.solve_ik(X_WE) for X_WE in poses]
+
+
+@pytest.mark.renders
+def test_without_margin_the_silhouette_is_what_drake_renders(panda, rendered_robot):
+    silhouette = RobotSilhouette(panda, D415, margin_m=0.0, margin_px=0.0)
+    for q in postures(panda):
+        drawn, true = silhouette.mask(q), rendered_robot(q)
+        assert true.any()
+        assert (drawn & true).sum() / (drawn | true).sum() > 0.96
+
+
+@pytest.mark.renders
+def test_with_margin_the_silhouette_covers_every_rendered_pixel_and_little_else(panda, rendered_robot):
+    silhouette = RobotSilhouette(panda, D415)
+    for q in postures(panda):
+        drawn, true = silhouette.mask(q), rendered_robot(q)
+        assert (drawn & true).sum() == true.sum()
+        assert (drawn & true).sum() / (drawn | true).sum() > 0.75
+
+
+def test_the_pusher_enters_only_at_the_lower_edge_and_hides_nothing_that_it_pushes(panda):
+    q = panda.solve_ik(tip_pointing_down([0.5, 0.0, 0.01], 0.3))
+    mask = RobotSilhouette(panda, D415).mask(q)
+    p_CTip = np.linalg.inv(panda.X_EC)[:3, 3]
+    v_front = D415.cy + D415.fy * (p_CTip[1] - 0.01) / p_CTip[2]
+    rows, columns = np.nonzero(mask)
+    assert rows.min() > v_front - 5
+    assert columns.max() - columns.min() < 100
+
+
+def test_a_margin_grows_the_silhouette_on_every_side(panda):
+    q = panda.solve_ik(observe_pose([0.5, 0, 0], 0.5, panda.X_EC))
+    bare = RobotSilhouette(panda, D415, 0.0, 0.0).mask(q)
+    grown = RobotSilhouette(panda, D415, 0.0, 5.0).mask(q)
+    assert not (bare & ~grown).any()
+    rows, columns = (np.nonzero(m.any(axis=axis))[0] for m, axis in ((bare, 1), (bare, 0)))
+    more_rows, more_columns = (np.nonzero(grown.any(axis=axis))[0] for axis in (1, 0))
+    assert rows.min() - more_rows.min() == pytest.approx(5, abs=1)
+    assert columns.min() - more_columns.min() == pytest.approx(5, abs=1)
+    assert more_columns.max() - columns.max() == pytest.approx(5, abs=1)
