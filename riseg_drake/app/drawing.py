@@ -41,7 +41,9 @@ def _check_output(output: Path) -> None:
     if output.suffix not in (".dot", ".svg"):
         raise OutputError(f"{output}: the name must end in .dot or .svg")
     if output.suffix == ".svg" and shutil.which("dot") is None:
-        raise OutputError("SVG needs the program dot; install the package graphviz, or ask for a .dot file")
+        raise OutputError(
+            "SVG needs the program dot; install the package graphviz, or ask for a .dot file"
+        )
 
 
 def _to_svg(dot: str) -> bytes:

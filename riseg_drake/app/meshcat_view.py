@@ -7,7 +7,7 @@ recording keeps when it is visible.
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.common.value import AbstractValue, Value
+from pydrake.common.value import Value
 from pydrake.geometry import Cylinder, Meshcat, MeshcatCone, Rgba
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.perception import BaseField, Fields, PointCloud
@@ -16,7 +16,8 @@ from pydrake.systems.framework import Context, EventStatus, LeafSystem
 from riseg_drake.app.overlay import object_colors
 from riseg_drake.geometry.camera import back_project
 from riseg_drake.geometry.rgbd import Frame, FramePair
-from riseg_drake.pushing.push import ArmPhase, Push
+from riseg_drake.pushing.push import Push
+from riseg_drake.segmentation.segment import Segmentation
 
 POINT_STRIDE = 3
 """Every third pixel in both directions becomes a point: 34 thousand at 640x480."""
@@ -28,63 +29,54 @@ ARROW_COLOR = Rgba(0.84, 0.37, 0.0, 1.0)
 
 
 class MeshcatView(LeafSystem):
-    """Draws the point cloud coloured by object id, and the planned push as an arrow.
+    """Draws the point cloud coloured by object id, and the push that is under way as an arrow.
 
-    Inputs: `pair` (FramePair), `mask` (uint16 [H, W]), `push` (Push or None), `phase` (ArmPhase, step).
+    Inputs: `pair` (FramePair), `segmentation` (Segmentation), `active_push` (Push or None),
+    `interaction_step` (int).
     """
 
     def __init__(self, meshcat: Meshcat, period: float):
         super().__init__()
         self.set_name("MeshcatView")
         self._meshcat = meshcat
-        self._shown_push: object = None
-        self._paths: dict[str, str] = {}  # by kind ("points", "push"), what is visible now
+        self._visible: dict[str, str] = {}  # by kind ("points", "push"), the path that is shown now
         self._sequence = -1
-        for name in ("pair", "mask", "push", "phase"):
-            self.DeclareAbstractInputPort(name, _any_value())
+        self._push: Push | None = None
+        for name in ("pair", "segmentation", "active_push", "interaction_step"):
+            self.DeclareAbstractInputPort(name, Value[object]())
         self.DeclarePeriodicPublishEvent(period, 0.0, self._publish)
 
     def _publish(self, context: Context) -> EventStatus:
         pair: FramePair | None = self.GetInputPort("pair").Eval(context)
-        phase, interaction_step = self.GetInputPort("phase").Eval(context)
-        time = context.get_time()
-        if pair is not None and pair.current.sequence != self._sequence:
-            self._sequence = pair.current.sequence
-            mask = self.GetInputPort("mask").Eval(context)
-            self._show_points(pair.current, mask, interaction_step, time)
-        # The push is looked at only once it is under way: to look is to plan.
-        push = self.GetInputPort("push").Eval(context) if phase in _MOVING else None
-        self._show_push(push, interaction_step, time)
+        segmentation: Segmentation = self.GetInputPort("segmentation").Eval(context)
+        step: int = self.GetInputPort("interaction_step").Eval(context)
+        # At a tick both are of the frame before; a pair without its mask yet is left for the next tick.
+        if pair is not None and self._sequence != pair.current.sequence == segmentation.sequence:
+            self._sequence = segmentation.sequence
+            path = f"/riseg/points/step_{step}"
+            self._meshcat.SetObject(path, object_cloud(pair.current, segmentation.mask), POINT_SIZE)
+            self._turn_to("points", path, context.get_time())
+        push: Push | None = self.GetInputPort("active_push").Eval(context)
+        if push is not self._push:
+            self._push = push
+            path = f"/riseg/push/step_{step}" if push is not None else ""
+            if push is not None:
+                draw_arrow(self._meshcat, path, push)
+            self._turn_to("push", path, context.get_time())
         return EventStatus.Succeeded()
 
-    def _show_points(self, frame: Frame, mask: NDArray, interaction_step: int, time: float) -> None:
-        path = f"/riseg/points/step_{interaction_step}"
-        self._meshcat.SetObject(path, object_cloud(frame, mask), POINT_SIZE)
-        self._turn_to("points", path, time)
-
-    def _show_push(self, push: Push | None, interaction_step: int, time: float) -> None:
-        if push is self._shown_push:
-            return
-        self._shown_push = push
-        path = f"/riseg/push/step_{interaction_step}"
-        if push is not None:
-            draw_arrow(self._meshcat, path, push)
-        self._turn_to("push", path if push is not None else "", time)
-
     def _turn_to(self, kind: str, path: str, time: float) -> None:
-        """Make one path of a kind visible, and the one that was so until now invisible."""
-        before = self._paths.get(kind, "")
+        """Show one path of a kind instead of the one that was shown until now."""
+        before = self._visible.get(kind, "")
         if path == before:
             return
         if before:
             self._meshcat.SetProperty(before, "visible", False, time)
         if path:
-            self._meshcat.SetProperty(path, "visible", False, 0.0)  # in the replay: not from the beginning
+            if time > 0:  # in the replay it is not there from the beginning
+                self._meshcat.SetProperty(path, "visible", False, 0.0)
             self._meshcat.SetProperty(path, "visible", True, time)
-        self._paths[kind] = path
-
-
-_MOVING = (ArmPhase.APPROACH, ArmPhase.PUSH)
+        self._visible[kind] = path
 
 
 def object_cloud(frame: Frame, mask: NDArray) -> PointCloud:
@@ -115,7 +107,3 @@ def draw_arrow(meshcat: Meshcat, path: str, push: Push) -> None:
     meshcat.SetTransform(f"{path}/shaft", RigidTransform(along, tail + shaft / 2 * direction_W))
     meshcat.SetObject(f"{path}/head", MeshcatCone(head, head / 2, head / 2), ARROW_COLOR)
     meshcat.SetTransform(f"{path}/head", RigidTransform(against, tip))
-
-
-def _any_value() -> AbstractValue:
-    return Value[object]()

@@ -109,9 +109,9 @@ class RunFolder:
         self._summary["steps"].append(_step_to_json(step))
         self._write_summary()
 
-    def finish(self, state: str, **figures: Any) -> None:
-        """Enter how the run ended and figures of the whole run."""
-        self._summary.update(state=state, **figures)
+    def note(self, **entries: Any) -> None:
+        """Enter something about the whole run."""
+        self._summary.update(entries)
         self._write_summary()
 
     def _write_summary(self) -> None:

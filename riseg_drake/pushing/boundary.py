@@ -20,7 +20,10 @@ class BoundaryParameters:
 
 
 def boundary(
-    cluster: NDArray[np.bool_], center_W: NDArray, table: TableMap, parameters: BoundaryParameters | None = None
+    cluster: NDArray[np.bool_],
+    center_W: NDArray,
+    table: TableMap,
+    parameters: BoundaryParameters | None = None,
 ) -> NDArray[np.float64]:
     """Boundary points p_WB [N, 2] of a cluster of cells, the most accessible first.
 

@@ -30,6 +30,8 @@ class ClusteringParameters:
     """K-Means and K-Medoids keep the best of this many random starts."""
     bandwidth: float = 0.03
     """Radius of Mean Shift's window, m."""
+    finer: int = 3
+    """How many finer clusterings may follow where the chosen one has no valid push."""
 
 
 METHODS = ("k-means", "k-medoids", "mean-shift")
@@ -46,9 +48,9 @@ class Clustering:
 
 
 def clusterings(
-    p_WQ: NDArray, parameters: ClusteringParameters, rng: np.random.Generator
+    p_WQ: NDArray, parameters: ClusteringParameters, rng: np.random.Generator, *, one_first: bool = False
 ) -> Iterator[Clustering]:
-    """First the clustering that the method chooses, then ever finer ones.
+    """First the clustering that the method chooses, then a few finer ones.
 
     The finer ones are there for scenes where the first has no valid push: the center of a ring is not
     on the ring, but the centers of its parts are.
@@ -57,24 +59,34 @@ def clusterings(
         p_WQ: [N, 2], N >= 1 points on the table, m.
         parameters: method and its constants.
         rng: subsampling and random starts.
+        one_first: begin with a single cluster instead of asking the method.
 
     Raises:
         ValueError: for a method that does not exist.
     """
     if parameters.method not in METHODS:
         raise ValueError(f"clustering method '{parameters.method}' does not exist; use one of {METHODS}")
-    chosen = rng.choice(len(p_WQ), parameters.sample, replace=False) if len(p_WQ) > parameters.sample else ...
-    sample = p_WQ[chosen]
+    sample = p_WQ
+    if len(p_WQ) > parameters.sample:
+        sample = p_WQ[rng.choice(len(p_WQ), parameters.sample, replace=False)]
+    first = 1 if one_first else None
     if parameters.method == "mean-shift":
-        for bandwidth in parameters.bandwidth * 0.7 ** np.arange(4):
+        if one_first:
+            yield _by_nearest_center(p_WQ, p_WQ.mean(axis=0, keepdims=True))
+        for bandwidth in parameters.bandwidth * 0.7 ** np.arange(1 + parameters.finer):
             centers = MeanShift(bandwidth=bandwidth, bin_seeding=True).fit(sample).cluster_centers_
             yield _by_nearest_center(p_WQ, centers)
         return
     fit = _k_means if parameters.method == "k-means" else _k_medoids
-    ks = range(1, min(parameters.largest_k, len(np.unique(sample, axis=0))) + 1)
-    fits = [fit(sample, k, parameters.restarts, rng) for k in ks]
-    first = elbow(np.array([inertia for _, inertia in fits]), parameters.elbow)
-    for centers, _ in fits[first - 1 :]:
+    largest_k = min(parameters.largest_k, len(sample))
+    fits: dict[int, NDArray] = {}
+    if first is None:
+        inertia = np.empty(largest_k)
+        for k in range(1, largest_k + 1):
+            fits[k], inertia[k - 1] = fit(sample, k, parameters.restarts, rng)
+        first = elbow(inertia, parameters.elbow)
+    for k in range(first, min(first + parameters.finer, largest_k) + 1):
+        centers = fits[k] if k in fits else fit(sample, k, parameters.restarts, rng)[0]
         yield _by_nearest_center(p_WQ, centers)
 
 
@@ -88,7 +100,9 @@ def elbow(inertia: NDArray, threshold: float) -> int:
     """
     if len(inertia) < 3:
         return 1
-    relative = np.log(np.maximum(inertia, 1e-12 * max(inertia[0], 1e-12)) * np.arange(1, len(inertia) + 1))
+    relative = np.log(
+        np.maximum(inertia, 1e-12 * max(inertia[0], 1e-12)) * np.arange(1, len(inertia) + 1)
+    )
     bend = relative[:-2] - 2 * relative[1:-1] + relative[2:]
     sharpest = int(np.argmax(bend))
     return sharpest + 2 if bend[sharpest] > threshold else 1
@@ -111,10 +125,9 @@ def _k_medoids(
     Alternates assignment and the choice of each cluster's most central point (Park and Jun 2009), on
     at most 500 of the points: the distances between all pairs are needed.
     """
+    candidates = points
     if len(points) > 500:
         candidates = points[rng.choice(len(points), 500, replace=False)]
-    else:
-        candidates = points
     distance = cdist(candidates, candidates)
     best: tuple[float, NDArray] = (np.inf, np.arange(k))
     for _ in range(restarts):
@@ -137,7 +150,7 @@ def _k_medoids(
 
 
 def _spread_start(distance: NDArray, k: int, rng: np.random.Generator) -> NDArray[np.intp]:
-    """k different points, each drawn with probability growing with its squared distance to the others."""
+    """k different points, drawn one by one in proportion to the squared distance to those before."""
     chosen = [int(rng.integers(len(distance)))]
     while len(chosen) < k:
         weight = distance[:, chosen].min(axis=1) ** 2

@@ -25,6 +25,8 @@ class Contacts:
     """[N, 2], the middle of the bar's face when it touches, on the line through boundary point and c."""
     height: NDArray[np.float64]
     """[N], how high the object is where it is touched, m; 0 where the bar misses."""
+    face: NDArray[np.float64]
+    """[N], share of the bar's width that meets the object within SKIN / 2 of the first contact."""
     tip_height: NDArray[np.float64]
     """[N], height of the bar's end face above the table, m."""
     high_enough: NDArray[np.bool_]
@@ -58,13 +60,15 @@ def find_contacts(
     swath = rectangle(boundary_W, direction_W, along, across)
     height = np.where(table.lookup(cluster, swath), table.lookup(table.height, swath), 0.0)
     profile = height.max(axis=2)  # [N, S]
-    touching = profile >= lowest_object
-    touched = touching.any(axis=1)
-    first = np.where(touched, np.argmax(touching, axis=1), 0)
+    touching = height >= lowest_object  # [N, S, T]
+    touched = touching.any(axis=(1, 2))
+    first = np.argmax(touching.any(axis=2), axis=1)  # [N], 0 where nothing is touched
     # The face meets the near edge of the first cell, half a cell before its centre.
     travel = along[first] - table.cell / 2
-    skin = np.arange(len(along))[None] - first[:, None]
-    skin_height = np.where((skin >= 0) & (skin * table.cell <= SKIN), profile, 0.0).max(axis=1)
+    behind_face = table.cell * (np.arange(len(along))[None] - first[:, None])  # [N, S]
+    skin_height = np.where((behind_face >= 0) & (behind_face <= SKIN), profile, 0.0).max(axis=1)
+    near_face = (behind_face >= 0) & (behind_face <= SKIN / 2)
+    face = (touching & near_face[..., None]).any(axis=1).mean(axis=1)
     skin_height[~touched] = 0.0
     b_W = boundary_W + travel[:, None] * direction_W
 
@@ -78,15 +82,16 @@ def find_contacts(
     stroke = rectangle(b_W, direction_W, np.arange(0.0, parameters.d_push, table.cell), across)
     strangers = table.objects & ~cluster
     known = strangers & table.segmented
-    in_gap = table.lookup(strangers, gap).any(axis=(1, 2))
-    in_stroke = table.lookup(known, stroke).any(axis=(1, 2))
+    met = np.any(table.lookup(strangers, gap), axis=(1, 2))
+    met |= np.any(table.lookup(known, stroke), axis=(1, 2))
     tip_height = np.minimum(pusher.tip_height, pusher.height_share * skin_height)
     return Contacts(
         b_W=b_W,
         height=skin_height,
+        face=face,
         tip_height=np.maximum(tip_height, pusher.lowest_tip_height),
         high_enough=touched & (skin_height >= lowest_object),
-        only_target=~in_gap & ~in_stroke,
+        only_target=~met,
         beside_target=table.lookup(strangers & ~table.segmented, stroke).mean(axis=(1, 2)),
         unseen=1.0 - table.lookup(table.seen, gap).mean(axis=(1, 2)),
     )

@@ -7,14 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.pushing.boundary import BoundaryParameters, boundary
-from riseg_drake.pushing.clustering import ClusteringParameters, clusterings
+from riseg_drake.pushing.clusters import Cluster, ClustersParameters, find_clusters
 from riseg_drake.pushing.contact import find_contacts
 from riseg_drake.pushing.objects_to_segment import ObjectsToSegmentParameters, objects_to_segment
-from riseg_drake.pushing.push import Push, TriedPush
+from riseg_drake.pushing.push import Push
 from riseg_drake.pushing.push_path import PushPath
 from riseg_drake.pushing.pusher import Pusher
 from riseg_drake.pushing.ranking import RankingParameters, cost_of_pushes
 from riseg_drake.pushing.table_map import TableMap, TableMapParameters
+from riseg_drake.pushing.tried_pushes import TriedPush
 from riseg_drake.pushing.validity import ValidityParameters, is_valid_push
 
 
@@ -24,13 +25,13 @@ class FindActionParameters:
 
     table: TableMapParameters = field(default_factory=TableMapParameters)
     to_segment: ObjectsToSegmentParameters = field(default_factory=ObjectsToSegmentParameters)
-    clustering: ClusteringParameters = field(default_factory=ClusteringParameters)
+    clusters: ClustersParameters = field(default_factory=ClustersParameters)
     boundary: BoundaryParameters = field(default_factory=BoundaryParameters)
     validity: ValidityParameters = field(default_factory=ValidityParameters)
     pusher: Pusher = field(default_factory=Pusher)
     ranking: RankingParameters = field(default_factory=RankingParameters)
     paths: int = 30
-    """The arm's path is planned for at most this many candidates of one clustering, best first."""
+    """The arm's path is planned for at most this many candidates, the best, before finer clusters."""
 
 
 def find_action(
@@ -58,14 +59,14 @@ def find_action(
     to_segment = objects_to_segment(table, parameters.to_segment)  # lines 2 and 3
     if not to_segment.any():  # line 4
         return None  # line 5
-    p_WQ = table.points(to_segment)
-    for clustering in clusterings(p_WQ, parameters.clustering, rng):  # line 6
-        clusters = [_cells(to_segment, clustering.labels == k) for k in range(len(clustering.centers))]
+    for clusters in find_clusters(to_segment, table, parameters.clusters, rng):  # line 6
+        largest = max(int(cluster.cells.sum()) for cluster in clusters)
         pushes: list[Push] = []
-        for c, P in zip(clustering.centers, clusters, strict=True):  # line 8
-            largest = max(np.count_nonzero(cluster) for cluster in clusters)
-            B = boundary(P, c, table, parameters.boundary)  # line 7
-            pushes += valid_pushes(B, c, P, table, largest, tried, heading_W, parameters)  # lines 9, 10
+        for cluster in clusters:  # line 8
+            B = boundary(cluster.cells, cluster.center_W, table, parameters.boundary)  # line 7
+            pushes += valid_pushes(
+                B, cluster, table, largest, tried, heading_W, parameters
+            )  # lines 9, 10
         pushes.sort(key=lambda push: push.cost)
         for push in pushes[: parameters.paths]:
             if plan_path is None:
@@ -78,15 +79,14 @@ def find_action(
 
 def valid_pushes(
     boundary_W: NDArray,
-    center_W: NDArray,
-    cluster: NDArray[np.bool_],
+    cluster: Cluster,
     table: TableMap,
     largest_cluster: int,
     tried: Sequence[TriedPush],
     heading_W: NDArray | None,
     parameters: FindActionParameters,
 ) -> list[Push]:
-    """The pushes from boundary points [N, 2] towards the center [2] of one cluster that are valid.
+    """The pushes from boundary points [N, 2] towards the center of their cluster that are valid.
 
     Beyond the paper's IsValidPush: the bar touches the cluster before anything else, low enough but not
     too close to the table, and nothing is driven out of the work area.
@@ -94,23 +94,24 @@ def valid_pushes(
     if not len(boundary_W):
         return []
     validity, pusher = parameters.validity, parameters.pusher
+    center_W, P = cluster.center_W, cluster.cells
     direction_W = center_W - boundary_W
     direction_W /= np.linalg.norm(direction_W, axis=1, keepdims=True)
-    contacts = find_contacts(boundary_W, direction_W, cluster, table, pusher, validity)
-    is_valid = is_valid_push(contacts.b_W, direction_W, center_W, cluster, table, pusher, validity)
+    contacts = find_contacts(boundary_W, direction_W, P, table, pusher, validity)
+    is_valid = is_valid_push(contacts.b_W, direction_W, center_W, P, table, pusher, validity)
     cost = cost_of_pushes(
-        contacts, direction_W, is_valid.overlap, cluster, table, largest_cluster, tried, heading_W,
+        contacts, direction_W, is_valid.overlap, P, table, largest_cluster, tried, heading_W,
         validity, parameters.ranking,
     )  # fmt: skip
     possible = (
         is_valid.valid
         & contacts.high_enough
         & contacts.only_target
-        & stays_in_work_area(direction_W, cluster, table, validity.d_push)
+        & stays_in_work_area(direction_W, P, table, validity.d_push)
         & np.isfinite(cost)
     )
     tallest = float(table.height.max())
-    cluster_W = table.points(cluster)
+    cluster_W = table.points(P)
     length = validity.clearance + validity.d_push
     pushes = []
     for n in np.flatnonzero(possible):
@@ -142,10 +143,3 @@ def stays_in_work_area(
     before = np.count_nonzero(~table.in_work_area(P))
     after = np.count_nonzero(~table.in_work_area(P[None] + distance * direction_W[:, None]), axis=1)
     return after <= before
-
-
-def _cells(mask: NDArray[np.bool_], chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The part of a mask whose cells, in row order, are chosen."""
-    part = np.zeros_like(mask)
-    part[mask] = chosen
-    return part

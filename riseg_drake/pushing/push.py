@@ -1,4 +1,4 @@
-"""The paper's action a_i: one push, and the memory of pushes already tried."""
+"""The paper's action a_i: one push."""
 
 from dataclasses import dataclass, field
 from enum import Enum
@@ -52,15 +52,3 @@ class Push:
     """What the ranking says, less is better."""
     path: "PushPath | None" = field(default=None, repr=False)
     """The arm's way there and back; None until it has been planned."""
-
-
-@dataclass(frozen=True)
-class TriedPush:
-    """A push that was made, and whether it brought anything."""
-
-    p_WB: NDArray[np.float64]
-    """[3], its contact, m."""
-    direction_W: NDArray[np.float64]
-    """[2], its direction."""
-    changed: bool
-    """Whether the segmented area or the number of objects grew."""

@@ -125,7 +125,7 @@ class _Leg:
     ) -> NDArray[np.float64] | None:
         """Joint angles [N, 7] along it, the first q_from; None where the arm cannot follow."""
         steps = max(
-            np.linalg.norm(self.to_W - self.from_W) / parameters.position_step,
+            float(np.linalg.norm(self.to_W - self.from_W)) / parameters.position_step,
             abs(self.to_yaw - self.from_yaw) / parameters.angle_step,
             3,
         )

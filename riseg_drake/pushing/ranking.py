@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.pushing.contact import Contacts
-from riseg_drake.pushing.push import TriedPush
 from riseg_drake.pushing.table_map import TableMap
+from riseg_drake.pushing.tried_pushes import TriedPush
 from riseg_drake.pushing.validity import ValidityParameters, overlap_after_push
 
 
@@ -24,6 +24,8 @@ class RankingParameters:
     """Share of the cluster that would come to lie on other objects, relative to l_act."""
     overlap_beyond: float = 0.5
     """The same for twice the push distance: free space ahead is better than a gap just wide enough."""
+    edgy: float = 0.2
+    """Touching with a small part of the bar's width: corners slip off, faces do not."""
     beside_target: float = 1.0
     """What of the bar's face meets unsegmented things beside the cluster: both would move alike."""
     small: float = 0.5
@@ -71,6 +73,7 @@ def cost_of_pushes(
     cost = (
         parameters.overlap * overlap / validity.l_act
         + parameters.overlap_beyond * beyond
+        + parameters.edgy * (1.0 - contacts.face)
         + parameters.beside_target * contacts.beside_target
         + parameters.small * (1.0 - len(P) / largest_cluster)
         + parameters.near_segmented * _share_near_segmented(cluster, table, validity.d_push)
@@ -92,7 +95,7 @@ def cost_of_pushes(
 
 
 def _share_near_segmented(cluster: NDArray[np.bool_], table: TableMap, distance: float) -> float:
-    """Share of a cluster's points that have a segmented object within a distance in one of 8 directions."""
+    """Share of a cluster's points with a segmented object at a distance in any of 8 directions."""
     if not table.segmented.any():
         return 0.0
     P = table.points(cluster)

@@ -39,7 +39,7 @@ def minimum_jerk(tau: NDArray) -> NDArray[np.float64]:
 
 
 def steady_speed(ramp: float) -> Profile:
-    """A profile that holds one speed but for smooth ramps, each `ramp` (<= 0.5) of the time, at both ends.
+    """A profile with one speed but for smooth ramps, each `ramp` (<= 0.5) of the time, at both ends.
 
     In a ramp the speed follows 3 x^2 - 2 x^3.
     """
@@ -98,6 +98,9 @@ def rest_to_rest(
     knots = max(int(np.ceil(duration / KNOT_INTERVAL)), 4)
     tau = np.linspace(0, 1, knots + 1)
     rest = np.zeros((waypoints.shape[1], 1))
-    return PiecewisePolynomial.CubicWithContinuousSecondDerivatives(
-        tau * max(duration, 1e-3), path(profile(tau)[0]).T, rest, rest
+    return PiecewisePolynomial.CubicWithContinuousSecondDerivatives(  # type: ignore[arg-type]
+        tau * max(duration, 1e-3),
+        path(profile(tau)[0]).T,
+        rest,
+        rest,  # type: ignore[arg-type]
     )

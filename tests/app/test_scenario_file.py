@@ -63,9 +63,7 @@ def test_an_error_says_in_one_line_where_it_is_and_what_would_have_been_right(te
 
 def test_a_missing_file_is_named_with_its_nearest_neighbour(tmp_path):
     (tmp_path / "simulation.yaml").write_text("")
-    with pytest.raises(
-        ScenarioError, match=r"simulatoin.yaml is not there; did you mean .*simulation.yaml\?"
-    ):
+    with pytest.raises(ScenarioError, match=r"simulatoin.yaml is not there; did you mean .*simulation.yaml\?"):
         read_scenario(tmp_path / "simulatoin.yaml", Scene)
     with pytest.raises(ScenarioError, match="nor is the folder"):
         read_scenario(tmp_path / "nowhere" / "x.yaml", Scene)

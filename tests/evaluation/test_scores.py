@@ -32,9 +32,7 @@ def test_all_reference_cases_agree_to_1e_9():
     assert tuple(data["keys"]) == FIGURES
     for k, name in enumerate(data["names"]):
         scores = score(data[f"prediction_{k:02d}"], data[f"ground_truth_{k:02d}"])
-        np.testing.assert_allclose(
-            astuple(scores), data["reference"][k], rtol=0, atol=1e-9, err_msg=name
-        )
+        np.testing.assert_allclose(astuple(scores), data["reference"][k], rtol=0, atol=1e-9, err_msg=name)
 
 
 def test_nothing_predicted_is_precise_and_recalls_nothing():

@@ -1,0 +1,136 @@
+"""The wiring: a station, Alg. 2, Alg. 3 and the arm's motion as one Diagram."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import Meshcat
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, LeafSystem, OutputPort
+
+from riseg_drake.app.meshcat_view import MeshcatView
+from riseg_drake.app.scenario import Scenario
+from riseg_drake.app.scenario_file import ScenarioError
+from riseg_drake.app.segmentation_block import add_segmentation
+from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.pushing.push import ArmPhase
+from riseg_drake.robot.kinematics import PandaKinematics
+from riseg_drake.segmentation.segment import Segmentation
+from riseg_drake.stations.simulated import SimulatedStation, start_position
+from riseg_drake.systems.arm_motion import ArmMotion
+from riseg_drake.systems.push_planner import PushPlanner
+
+
+class WiredDiagram:
+    """The whole of Alg. 1 around a simulated station, and what an application reads from it.
+
+    All ports of the station are exported under their own names, and the outputs of the stages: `pair`,
+    `above_table`, `expected_flow`, `optical_flow`, `groups`, `mask`, `segmentation`, `push`, `phase`,
+    `interaction_step`, `active_push`.
+    """
+
+    def __init__(self, diagram: Diagram, station: SimulatedStation, stages: list[LeafSystem], intrinsics: Intrinsics):
+        self.diagram = diagram
+        self.stages = stages
+        self.intrinsics = intrinsics
+        self.object_names = {i: placed.name for i, placed in enumerate(station.objects, start=1)}
+        """By object id, as in the ground truth."""
+        self._object_bodies = station.object_bodies
+        self._ports: dict[str, OutputPort] = {}
+
+    def read(self, port: str, context: Context) -> Any:
+        """The present value of an exported output."""
+        if port not in self._ports:
+            self._ports[port] = self.diagram.GetOutputPort(port)
+        return self._ports[port].Eval(context)
+
+    def pair(self, context: Context) -> FramePair | None:
+        """The frames of t-1 and t; None before the first."""
+        return self.read("pair", context)
+
+    def segmentation(self, context: Context) -> Segmentation:
+        """L_t with what is remembered for L_t+1; its `sequence` is the frame's it belongs to."""
+        return self.read("segmentation", context)
+
+    def mask(self, context: Context) -> NDArray[np.uint16]:
+        """L_t [H, W]."""
+        return self.read("mask", context)
+
+    def phase(self, context: Context) -> ArmPhase:
+        """What the arm is doing."""
+        return self.read("phase", context)
+
+    def interaction_step(self, context: Context) -> int:
+        """How many pushes are over."""
+        return self.read("interaction_step", context)
+
+    def position(self, context: Context) -> NDArray[np.float64]:
+        """Joint angles theta_t [7], rad."""
+        return self.read("panda.position_measured", context)
+
+    def true_labels(self, context: Context) -> NDArray[np.uint16]:
+        """The true visible object ids [H, W] of this moment; drawn when asked for."""
+        return self.read("cheat.label_image", context).data[..., 0].astype(np.uint16)
+
+    def true_poses(self, context: Context) -> dict[str, NDArray[np.float64]]:
+        """The true poses X_WB [4, 4] of the objects, by name."""
+        poses = self.read("cheat.body_poses", context)
+        return {
+            self.object_names[object_id]: poses[int(body)].GetAsMatrix4()
+            for object_id, body in self._object_bodies.items()
+        }
+
+
+def make_diagram(scenario: Scenario, seed: int, meshcat: Meshcat | None = None) -> WiredDiagram:
+    """Build the simulation of a scenario; the seed draws scene, noise and samples.
+
+    Raises ScenarioError (or the station's SceneError) for settings that cannot be.
+    """
+    config = scenario.station
+    try:
+        station = SimulatedStation(config, seed, meshcat=meshcat)
+        q_observe = np.array(start_position(config))
+    except (ValueError, RuntimeError) as error:
+        raise ScenarioError(" ".join(str(error).split())) from error
+    intrinsics = config.camera.intrinsics
+    kinematics = PandaKinematics(config.panda)
+
+    builder = DiagramBuilder()
+    builder.AddSystem(station)
+    segmentation = add_segmentation(builder, scenario, intrinsics, kinematics, 1 / config.camera.rate, seed)
+    planner = builder.AddNamedSystem("PushPlanner", PushPlanner(kinematics, scenario.push, seed))
+    arm = builder.AddNamedSystem("ArmMotion", ArmMotion(q_observe, scenario.arm))
+
+    for name in ("color_image", "depth_image", "image_time"):
+        builder.Connect(station.GetOutputPort(f"wrist.{name}"), segmentation.inputs[name])
+    builder.Connect(station.GetOutputPort("panda.position_measured"), segmentation.inputs["position"])
+    for name in ("pair", "above_table", "mask"):
+        builder.Connect(segmentation.outputs[name], planner.GetInputPort(name))
+    for name in ("pair", "mask"):
+        builder.Connect(segmentation.outputs[name], arm.GetInputPort(name))
+    builder.Connect(arm.GetOutputPort("position"), planner.GetInputPort("position"))
+    builder.Connect(arm.GetOutputPort("tried_pushes"), planner.GetInputPort("tried_pushes"))
+    builder.Connect(planner.GetOutputPort("push"), arm.GetInputPort("push"))
+    builder.Connect(
+        station.GetOutputPort("panda.position_measured"), arm.GetInputPort("position_measured")
+    )
+    builder.Connect(arm.GetOutputPort("position"), station.GetInputPort("panda.position"))
+    if meshcat is not None:
+        view = builder.AddSystem(MeshcatView(meshcat, 1 / config.camera.rate))
+        for name in ("pair", "segmentation"):
+            builder.Connect(segmentation.outputs[name], view.GetInputPort(name))
+        for name in ("active_push", "interaction_step"):
+            builder.Connect(arm.GetOutputPort(name), view.GetInputPort(name))
+
+    for index in range(station.num_output_ports()):
+        builder.ExportOutput(station.get_output_port(index), station.get_output_port(index).get_name())
+    for name, port in segmentation.outputs.items():
+        builder.ExportOutput(port, name)
+    builder.ExportOutput(planner.GetOutputPort("push"), "push")
+    for name in ("phase", "interaction_step", "active_push"):
+        builder.ExportOutput(arm.GetOutputPort(name), name)
+    diagram = builder.Build()
+    diagram.set_name("rt-RISeg")
+    return WiredDiagram(diagram, station, [*segmentation.stages, planner, arm], intrinsics)
+
+

@@ -1,0 +1,184 @@
+"""`riseg run`: one scene from the first look to the last push."""
+
+import resource
+from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from time import perf_counter
+
+from pydrake.geometry import Meshcat, StartMeshcat
+from pydrake.systems.framework import Context
+from rich.console import Console
+from rich.status import Status
+
+from riseg_drake.app.diagram import WiredDiagram, make_diagram
+from riseg_drake.app.graphics import require_graphics
+from riseg_drake.app.interactions import Listener, Progress, interactions
+from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step, stage_figures
+from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
+from riseg_drake.app.tables import score_table, stage_table
+from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.recording.layout import RecordedFrame
+from riseg_drake.recording.whole_file import write_text
+from riseg_drake.recording.writer import RecordingWriter
+from riseg_drake.systems.stage_clock import StageClock
+
+
+def run_command(
+    scenario_file: Path | None,
+    seed: int,
+    output: Path | None,
+    record: bool,
+    meshcat: bool,
+    console: Console,
+) -> None:
+    """Run one scene, tell how it goes, and show the scores of every interaction."""
+    scenario = load_scenario(scenario_file)
+    require_graphics()
+    name = scenario_name(scenario_file)
+    folder = RunFolder(output or Path("out") / f"{name}_seed_{seed}", {"scenario": name, "seed": seed})
+    console.print(f"{name}, seed {seed}, results in {folder.path}")
+    browser = StartMeshcat() if meshcat else None
+    with console.status("placing the objects") as status:
+        steps = run(scenario, seed, folder, record, browser, Narrator(console, status))
+    _report(steps, console)
+
+
+def run(
+    scenario: Scenario,
+    seed: int,
+    folder: RunFolder,
+    record: bool = False,
+    meshcat: Meshcat | None = None,
+    narrator: "Narrator | None" = None,
+) -> list[Step]:
+    """Run one scene into a folder; returns its steps. However it stops, what it leaves is whole."""
+    narrator = narrator or Narrator()
+    progress = Progress()
+    steps: list[Step] = []
+    with ExitStack() as stack:
+        stack.enter_context(_state_of(folder, progress, steps))
+        wired = make_diagram(scenario, seed, meshcat)
+        folder.note(objects={str(object_id): name for object_id, name in wired.object_names.items()})
+        listeners: list[Listener] = [lambda *_: narrator.follow(progress)]
+        if record:
+            writer = stack.enter_context(RecordingWriter(folder.path / RECORDING, wired.intrinsics))
+            listeners.append(_recorder(wired, writer))
+        if meshcat is not None:
+            stack.enter_context(_replay(meshcat, folder.path / REPLAY))
+        for step in interactions(wired, StageClock(), progress, scenario.longest, tuple(listeners)):
+            folder.write_step(step)
+            steps.append(step)
+            narrator.tell_step(step)
+    narrator.tell_end(progress)
+    return steps
+
+
+def peak_memory_mb() -> int:
+    """The most memory this process has held so far, MB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024  # Linux counts in kB
+
+
+class Narrator:
+    """Tells a person how it goes: a line renewed at every frame, and one that stays for every step."""
+
+    def __init__(self, console: Console | None = None, status: Status | None = None):
+        self._console = console or Console(quiet=True)
+        self._status = status
+        self._start = perf_counter()
+
+    def follow(self, progress: Progress) -> None:
+        """Renew the line at the bottom of the terminal."""
+        if self._status is not None:
+            self._status.update(
+                f"interaction {progress.interaction_step}, {progress.phase.value}: "
+                f"{_objects(progress.objects)} found, {self._elapsed()}"
+            )
+
+    def tell_step(self, step: Step) -> None:
+        """Say what the mask shows after an interaction."""
+        i = step.interaction_step
+        when = f"after interaction {i}" if i else "before any push"
+        f = f", Overlap F {100 * step.scores.overlap_f:.1f} %" if step.scores is not None else ""
+        self._console.print(f"{when}: {_objects(step.objects)} found{f}, {self._elapsed()}")
+
+    def tell_end(self, progress: Progress) -> None:
+        """Say why it is over."""
+        self._console.print(f"ended after {self._elapsed()}: {progress.end}")
+
+    def _elapsed(self) -> str:
+        return f"{perf_counter() - self._start:.0f} s"
+
+
+def _objects(number: int) -> str:
+    return "1 object" if number == 1 else f"{number} objects"
+
+
+@contextmanager
+def _state_of(folder: RunFolder, progress: Progress, steps: list[Step]) -> Iterator[None]:
+    """Enter in the summary how the run ended, also where it was stopped or failed."""
+    start = perf_counter()
+
+    def finish(state: str, end: str) -> None:
+        folder.note(
+            state=state,
+            end=end,
+            seconds=round(perf_counter() - start, 2),
+            simulated_s=round(progress.time, 3),
+            frames=progress.frames,
+            peak_memory_mb=peak_memory_mb(),
+        )
+
+    try:
+        yield
+    except KeyboardInterrupt:
+        finish("interrupted", "stopped by the user")
+        finished = f"{len(steps)} finished step{'' if len(steps) == 1 else 's'}"
+        raise KeyboardInterrupt(f"{finished} in {folder.path}") from None
+    except Exception as error:
+        finish("failed", " ".join(str(error).split()))
+        raise
+    finish("done", progress.end)
+
+
+def _recorder(wired: WiredDiagram, writer: RecordingWriter) -> Listener:
+    """Writes every frame, with the truth that the simulation knows."""
+
+    def record(frame: Frame, context: Context) -> None:
+        writer.append(
+            RecordedFrame(
+                time=frame.time,
+                color=frame.color,
+                depth=frame.depth,
+                X_WC=frame.X_WC,
+                position=wired.position(context),
+                robot=frame.robot,
+                labels=wired.true_labels(context),
+            )
+        )
+
+    return record
+
+
+@contextmanager
+def _replay(meshcat: Meshcat, file: Path) -> Iterator[None]:
+    """Keep what Meshcat shows, and save it as one HTML file."""
+    meshcat.StartRecording(set_visualizations_while_recording=True)
+    try:
+        yield
+    finally:
+        meshcat.StopRecording()
+        meshcat.PublishRecording()
+        write_text(file, meshcat.StaticHtml())
+
+
+def _report(steps: list[Step], console: Console) -> None:
+    rows = [(str(step.interaction_step), step.scores) for step in steps if step.scores is not None]
+    console.print("\nscores in percent, after each interaction")
+    console.print(score_table(rows, first="\nstep"))
+    seconds: dict[str, list[float]] = defaultdict(list)
+    for step in steps:
+        for stage, times in step.stage_seconds.items():
+            seconds[stage].extend(times)
+    console.print(stage_table(stage_figures(seconds), title="time of each stage"))

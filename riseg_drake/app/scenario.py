@@ -1,0 +1,54 @@
+"""What a run can be told: every room's parameters under one roof."""
+
+from dataclasses import dataclass, field
+from importlib.resources import files
+from pathlib import Path
+
+from riseg_drake.app.scenario_file import parse_scenario, read_scenario
+from riseg_drake.pushing.plan_push import PushPlanningParameters
+from riseg_drake.segmentation.above_table import AboveTableParameters
+from riseg_drake.segmentation.bfif import BFIFParameters
+from riseg_drake.segmentation.frame_pairs import FramePairParameters
+from riseg_drake.segmentation.optical_flow import DisFlowParameters
+from riseg_drake.segmentation.segment import SegmentParameters
+from riseg_drake.stations.simulated import SimulatedStationConfig
+from riseg_drake.systems.arm_motion import ArmMotionParameters
+
+BUILT_IN = "simulation"
+
+
+@dataclass
+class Scenario:
+    """A YAML file's keys are these fields, and theirs in turn; what it leaves out stays as it is here."""
+
+    station: SimulatedStationConfig = field(default_factory=SimulatedStationConfig)
+    """Arm, camera, table, objects and physics."""
+    above_table: AboveTableParameters = field(default_factory=AboveTableParameters)
+    """What counts as standing on the table (Alg. 3, line 1)."""
+    frame_pair: FramePairParameters = field(default_factory=FramePairParameters)
+    """Which two frames are compared."""
+    optical_flow: DisFlowParameters = field(default_factory=DisFlowParameters)
+    """Alg. 2, line 2."""
+    bfif: BFIFParameters = field(default_factory=BFIFParameters)
+    """Alg. 2, lines 3 to 6."""
+    segment: SegmentParameters = field(default_factory=SegmentParameters)
+    """Alg. 2, line 7."""
+    push: PushPlanningParameters = field(default_factory=PushPlanningParameters)
+    """Alg. 3, and the arm's path for a push."""
+    arm: ArmMotionParameters = field(default_factory=ArmMotionParameters)
+    """Alg. 1: when to look, and how many pushes at most."""
+    longest: float = 300.0
+    """A run ends after this time even if the arm is not done, simulated seconds."""
+
+
+def load_scenario(path: Path | None) -> Scenario:
+    """The scenario of a file, or the built-in simulation. Raises ScenarioError."""
+    if path is not None:
+        return read_scenario(path, Scenario)
+    built_in = files("riseg_drake.diagrams") / f"{BUILT_IN}.yaml"
+    return parse_scenario(built_in.read_text(encoding="utf-8"), Scenario, source=built_in.name)
+
+
+def scenario_name(path: Path | None) -> str:
+    """What a scenario is called in folders and summaries."""
+    return BUILT_IN if path is None else path.stem

@@ -1,0 +1,100 @@
+"""Alg. 2 wired: the same systems in the same way, whatever feeds them."""
+
+from dataclasses import dataclass
+
+from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, LeafSystem, OutputPort
+
+from riseg_drake.app.scenario import Scenario
+from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.robot.kinematics import PandaKinematics
+from riseg_drake.robot.silhouette import RobotSilhouette
+from riseg_drake.segmentation.optical_flow import DisFlow
+from riseg_drake.systems.bfif_grouper import BFIFGrouper
+from riseg_drake.systems.expected_flow import ExpectedFlow
+from riseg_drake.systems.frame_pair import FramePairMemory
+from riseg_drake.systems.frame_view import FrameView
+from riseg_drake.systems.mask_propagator import MaskPropagator
+from riseg_drake.systems.objects_above_table import ObjectsAboveTable
+from riseg_drake.systems.optical_flow import OpticalFlow
+
+FRAME_OFFSET = 0.001
+"""A frame is taken in this long after the camera's tick, s: at the tick one would get the frame before.
+Less than a simulation step, so that the joint angles are those of the picture."""
+MASK_OFFSET = 0.0015
+"""L_t is made this long after the camera's tick, s: once the frame is in memory."""
+
+
+@dataclass(frozen=True)
+class SegmentationBlock:
+    """The systems of Alg. 2 in a builder, and the ports that are to be wired."""
+
+    stages: list[LeafSystem]
+    inputs: dict[str, InputPort]
+    """`color_image`, `depth_image`, `image_time`, `position`, as a station gives them."""
+    outputs: dict[str, OutputPort]
+    """`pair`, `above_table`, `expected_flow`, `optical_flow`, `groups`, `mask`, `segmentation`."""
+
+
+def add_segmentation(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    intrinsics: Intrinsics,
+    kinematics: PandaKinematics,
+    period: float,
+    seed: int,
+) -> SegmentationBlock:
+    """Add Alg. 2 to a builder, for a camera that gives a frame every `period` seconds."""
+    silhouette = RobotSilhouette(kinematics, intrinsics)
+    view = builder.AddSystem(FrameView(intrinsics, kinematics.X_WC, silhouette.mask))
+    above = builder.AddSystem(ObjectsAboveTable(scenario.above_table))
+    memory = builder.AddSystem(FramePairMemory(period, FRAME_OFFSET, scenario.frame_pair))
+    expected = builder.AddSystem(ExpectedFlow())
+    optical = builder.AddSystem(OpticalFlow(DisFlow(scenario.optical_flow)))
+    grouper = builder.AddSystem(BFIFGrouper(scenario.bfif, seed))
+    propagator = builder.AddSystem(MaskPropagator(intrinsics, period, MASK_OFFSET, scenario.segment))
+
+    def wire(source: LeafSystem, name: str, *targets: LeafSystem, port: str | None = None) -> None:
+        for target in targets:
+            builder.Connect(source.GetOutputPort(name), target.GetInputPort(port or name))
+
+    wire(view, "frame", above, memory)
+    wire(above, "above_table", memory)
+    wire(memory, "pair", expected, optical, grouper, propagator)
+    wire(expected, "expected_flow", grouper, propagator)  # lines 1
+    wire(optical, "optical_flow", grouper, propagator)  # and 2
+    wire(memory, "above_table_reference", grouper, port="above_table")
+    wire(memory, "above_table_reference", propagator)
+    wire(memory, "above_table", propagator)
+    wire(grouper, "groups", propagator)  # lines 3 to 6, and 7
+    wire(grouper, "flow_span", memory)
+
+    outputs = {
+        "pair": memory,
+        "above_table": memory,
+        "expected_flow": expected,
+        "optical_flow": optical,
+        "groups": grouper,
+        "mask": propagator,
+        "segmentation": propagator,
+    }
+    return SegmentationBlock(
+        stages=[view, above, memory, expected, optical, grouper, propagator],
+        inputs={
+            name: view.GetInputPort(name)
+            for name in ("color_image", "depth_image", "image_time", "position")
+        },
+        outputs={name: system.GetOutputPort(name) for name, system in outputs.items()},
+    )
+
+
+def make_segmentation(
+    scenario: Scenario, intrinsics: Intrinsics, kinematics: PandaKinematics, period: float, seed: int
+) -> tuple[Diagram, list[LeafSystem]]:
+    """Alg. 2 as a diagram of its own, its ports named as the block's; and its stages."""
+    builder = DiagramBuilder()
+    block = add_segmentation(builder, scenario, intrinsics, kinematics, period, seed)
+    for name, input_port in block.inputs.items():
+        builder.ExportInput(input_port, name)
+    for name, output_port in block.outputs.items():
+        builder.ExportOutput(output_port, name)
+    return builder.Build(), block.stages

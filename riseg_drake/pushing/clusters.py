@@ -1,0 +1,103 @@
+"""Alg. 3, line 6: objsToSegment divided into what is likely one object each.
+
+K-Means on everything at once, as in the paper, likes to join two small objects across a gap or to cut
+a big one: the scene is first taken apart where one can see through between things, and only a piece that
+could be several objects is clustered.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import count
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.pushing.clustering import Clustering, ClusteringParameters, clusterings
+from riseg_drake.pushing.table_map import TableMap
+
+
+@dataclass
+class ClustersParameters:
+    """How objsToSegment is divided."""
+
+    by_piece: bool = True
+    """Cluster each piece alone; False clusters all of objsToSegment at once, as the paper does."""
+    neck: float = 0.006
+    """Where a connection is narrower than this, m, it is cut."""
+    compact: float = 0.92
+    """A piece that fills this share of its convex hull is one cluster: things that touch leave gaps."""
+    clustering: ClusteringParameters = field(default_factory=ClusteringParameters)
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A center c and its points P."""
+
+    center_W: NDArray[np.float64]
+    """[2], m."""
+    cells: NDArray[np.bool_]
+    """P, as cells of the map."""
+
+
+def find_clusters(
+    to_segment: NDArray[np.bool_],
+    table: TableMap,
+    parameters: ClustersParameters,
+    rng: np.random.Generator,
+) -> Iterator[list[Cluster]]:
+    """centers and clusterPoints of objsToSegment; then, if asked again, ever finer ones."""
+    pieces = split_at_necks(to_segment, table, parameters.neck) if parameters.by_piece else [to_segment]
+    divisions = [
+        clusterings(
+            table.points(piece),
+            parameters.clustering,
+            rng,
+            one_first=parameters.by_piece and solidity(piece) >= parameters.compact,
+        )
+        for piece in pieces
+    ]
+    current: list[Clustering | None] = [None] * len(pieces)
+    for _ in count():
+        finer = [next(division, None) for division in divisions]
+        if all(clustering is None for clustering in finer):
+            return
+        current = [new or old for new, old in zip(finer, current, strict=True)]
+        yield [
+            Cluster(center, _cells(piece, clustering.labels == k))
+            for piece, clustering in zip(pieces, current, strict=True)
+            if clustering is not None
+            for k, center in enumerate(clustering.centers)
+        ]
+
+
+def split_at_necks(mask: NDArray[np.bool_], table: TableMap, neck: float) -> list[NDArray[np.bool_]]:
+    """The connected pieces of a mask, also cut where they hang together by less than `neck` metres."""
+    closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    depth_inside = cv2.distanceTransform(closed, cv2.DIST_L2, 5) * table.cell
+    cores = (depth_inside > neck / 2).astype(np.uint8)
+    amount, core_of = cv2.connectedComponents(cores, connectivity=4)
+    if amount <= 1:
+        return [mask] if mask.any() else []
+    # Every cell to the nearest core: distanceTransform numbers the cells of cores, not the cores.
+    _, nearest = cv2.distanceTransformWithLabels(
+        1 - cores, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    piece_of_label = np.zeros(nearest.max() + 1, int)
+    piece_of_label[nearest[cores > 0]] = core_of[cores > 0]
+    piece = np.where(mask, piece_of_label[nearest], 0)
+    return [piece == number for number in range(1, amount) if (piece == number).any()]
+
+
+def solidity(piece: NDArray[np.bool_]) -> float:
+    """Area of a piece without its holes over that of its convex hull: 1 for a convex one."""
+    outlines, _ = cv2.findContours(piece.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    hull = cv2.contourArea(cv2.convexHull(np.concatenate(outlines)))
+    return sum(cv2.contourArea(outline) for outline in outlines) / hull if hull > 0 else 1.0
+
+
+def _cells(mask: NDArray[np.bool_], chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The part of a mask whose cells, in row order, are chosen."""
+    part = np.zeros_like(mask)
+    part[mask] = chosen
+    return part

@@ -1,0 +1,76 @@
+"""From one image and its mask to a push with the arm's path: Alg. 3 with its feet on the ground."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.pushing.find_action import FindActionParameters, find_action
+from riseg_drake.pushing.push import Push
+from riseg_drake.pushing.push_path import PushPath, PushPathParameters, plan_push_path
+from riseg_drake.pushing.table_map import map_table
+from riseg_drake.pushing.tried_pushes import TriedPush
+from riseg_drake.robot.kinematics import PandaKinematics
+
+
+@dataclass
+class PushPlanningParameters:
+    """Everything that planning a push can be told."""
+
+    action: FindActionParameters = field(default_factory=FindActionParameters)
+    path: PushPathParameters = field(default_factory=PushPathParameters)
+
+
+def plan_push(
+    frame: Frame,
+    objects: NDArray[np.bool_],
+    height: NDArray,
+    plane_W: NDArray,
+    mask: NDArray,
+    q_observe: NDArray,
+    kinematics: PandaKinematics,
+    rng: np.random.Generator,
+    tried: Sequence[TriedPush] = (),
+    parameters: PushPlanningParameters | None = None,
+) -> Push | None:
+    """The next push, with a path from the posture q_observe [7] and back; None when there is none.
+
+    Args:
+        frame: what the camera saw from that posture.
+        objects: [H, W], GetObjsAboveTable of the frame.
+        height: [H, W], height above the table, m.
+        plane_W: [4], the table top.
+        mask: [H, W], L_t.
+        q_observe: [7], where the arm is and returns to, rad.
+        kinematics: of the arm.
+        rng: for the clustering.
+        tried: pushes made so far.
+        parameters: the defaults if None.
+    """
+    parameters = parameters or PushPlanningParameters()
+    table = map_table(
+        frame.depth,
+        frame.intrinsics,
+        frame.X_WC,
+        objects,
+        height,
+        mask,
+        plane_W,
+        robot=frame.robot,
+        parameters=parameters.action.table,
+    )
+    ahead_W = kinematics.X_WE(q_observe)[:2, 0]
+
+    def path_of(push: Push) -> PushPath | None:
+        return plan_push_path(push, kinematics, q_observe, parameters.action.pusher, parameters.path)
+
+    return find_action(
+        table,
+        rng,
+        parameters.action,
+        tried=tried,
+        heading_W=ahead_W / np.linalg.norm(ahead_W),
+        plan_path=path_of,
+    )

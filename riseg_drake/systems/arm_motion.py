@@ -1,0 +1,213 @@
+"""ArmMotion: the loop of Alg. 1 as seen from the arm. Observe, approach, push, retreat, observe."""
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
+
+from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.pushing.push import ArmPhase, Push
+from riseg_drake.pushing.time_law import minimum_jerk
+from riseg_drake.pushing.tried_pushes import SegmentedSoFar, TriedPush, segmented_so_far
+
+
+@dataclass
+class ArmMotionParameters:
+    """When to look, and when to stop."""
+
+    most_interactions: int = 5
+    """Pushes of one run (paper: up to 5)."""
+    settle_time: float = 0.25
+    """A push is chosen in a frame taken this long after the arm came to rest, s."""
+    rest_tolerance: float = 0.01
+    """The arm is at rest where it should be when every joint is this close, rad."""
+    null_frames: int = 2
+    """In how many frames in a row no push may be found before the scene counts as done."""
+    unchanged_area: float = 3e-4
+    """A push that changed the segmented area by less, m^2, and found no object, brought nothing."""
+    period: float = 1 / 30
+    """Time between two looks at what to do, s."""
+    largest_jump: float = 0.05
+    """A path may begin this far from the commanded joint angles, rad; the rest is faded out."""
+    fade_time: float = 0.5
+    """Over this time, s."""
+
+
+@dataclass(frozen=True)
+class _Memory:
+    """All that ArmMotion remembers. Never changed, only replaced."""
+
+    interaction_step: int = 0
+    push: Push | None = None
+    """What the arm is doing now; None at the observation posture."""
+    start_time: float = 0.0
+    offset: NDArray[np.float64] = field(default_factory=lambda: np.zeros(7))
+    """Of the commanded joint angles from the path at its start, rad."""
+    rest_since: float | None = None
+    """Since when the arm has been at rest at the observation posture, s; None while it is not."""
+    segmented_before: SegmentedSoFar | None = None
+    """What was segmented before the last push."""
+    unjudged: Push | None = None
+    """A push that is over but of which it is not known yet what it brought."""
+    tried: tuple[TriedPush, ...] = ()
+    asked: int = -1
+    """The last frame in which a push was looked for."""
+    nulls: int = 0
+    done: bool = False
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "_Memory":
+        # The framework copies the state at each event; what never changes needs no copy.
+        return self
+
+
+class ArmMotion(LeafSystem):
+    """Turns pushes into joint angles, and asks for the next push when it is time.
+
+    Inputs:
+        push: Push with a path, or None; evaluated only when the arm rests and sees, once for a frame.
+        pair: FramePair; tells when the frame was taken that push and mask belong to.
+        mask: L_t of the pair's current frame, to tell whether a push brought anything.
+        position_measured: the arm's joint angles [7], rad.
+
+    Outputs:
+        position: commanded joint angles [7], rad; velocity and acceleration are continuous.
+        phase: ArmPhase.
+        interaction_step: int, how many pushes are over.
+        active_push: the Push that is being done, or None.
+        tried_pushes: tuple of TriedPush.
+
+    No output depends on an input at the same moment: `tried_pushes` and `position` may be wired back to
+    the planner.
+    """
+
+    def __init__(self, q_observe: NDArray, parameters: ArmMotionParameters | None = None):
+        super().__init__()
+        self._q_observe = np.array(q_observe, float)
+        self._parameters = parameters or ArmMotionParameters()
+        anything = Value[object](None)
+        self._push = self.DeclareAbstractInputPort("push", anything)
+        self._pair = self.DeclareAbstractInputPort("pair", anything)
+        self._mask = self.DeclareAbstractInputPort("mask", anything)
+        self._measured = self.DeclareVectorInputPort("position_measured", 7)
+        self._memory = self.DeclareAbstractState(Value[object](_Memory()))
+        state = {self.abstract_state_ticket(self._memory)}
+        with_time = state | {self.time_ticket()}
+        self.DeclareVectorOutputPort("position", 7, self._calc_position, with_time)
+        self._declare("phase", self._calc_phase, with_time)
+        self._declare("interaction_step", lambda m, t: m.interaction_step, state)
+        self._declare("active_push", lambda m, t: m.push, state)
+        self._declare("tried_pushes", lambda m, t: m.tried, state)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(self._parameters.period, 0.0, self._update)
+
+    def _declare(self, name: str, read: Any, prerequisites: set) -> None:
+        def calc(context: Context, output: AbstractValue) -> None:
+            output.set_value(read(self._recall(context), context.get_time()))
+
+        self.DeclareAbstractOutputPort(name, lambda: Value[object](None), calc, prerequisites)
+
+    def _recall(self, context: Context) -> _Memory:
+        return context.get_abstract_state(int(self._memory)).get_value()
+
+    def _calc_position(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._command(self._recall(context), context.get_time()))
+
+    def _command(self, memory: _Memory, time: float) -> NDArray[np.float64]:
+        """The joint angles [7] to command at a time."""
+        if memory.push is None or memory.push.path is None:
+            return self._q_observe
+        since = time - memory.start_time
+        fading = 1.0 - minimum_jerk(np.clip(since / self._parameters.fade_time, 0.0, 1.0))[0]
+        return memory.push.path.position(since) + fading * memory.offset
+
+    def _calc_phase(self, memory: _Memory, time: float) -> ArmPhase:
+        if memory.done:
+            return ArmPhase.DONE
+        if memory.push is None or memory.push.path is None:
+            return ArmPhase.OBSERVE
+        return memory.push.path.phase(time - memory.start_time)
+
+    def _update(self, context: Context, state: State) -> EventStatus:
+        before = self._recall(context)
+        after = self._next(before, context)
+        if after is before:
+            return EventStatus.DidNothing()
+        state.get_mutable_abstract_state(int(self._memory)).set_value(after)
+        return EventStatus.Succeeded()
+
+    def _next(self, memory: _Memory, context: Context) -> _Memory:
+        """One step of the loop; it does one thing at a time, so that each sees the one before done."""
+        parameters, time = self._parameters, context.get_time()
+        if memory.done:
+            return memory
+        if memory.push is not None:
+            return self._after_motion(memory, time)
+
+        error = np.abs(self._measured.Eval(context) - self._q_observe).max()
+        if error > parameters.rest_tolerance:
+            return memory if memory.rest_since is None else replace(memory, rest_since=None)
+        if memory.rest_since is None:
+            return replace(memory, rest_since=time)
+        pair: FramePair | None = self._pair.Eval(context)
+        if pair is None or pair.current.time < memory.rest_since + parameters.settle_time:
+            return memory
+        if memory.unjudged is not None:
+            return self._judge(memory, pair, context)
+        if memory.interaction_step >= parameters.most_interactions:
+            return replace(memory, done=True)
+        if memory.asked == pair.current.sequence:
+            return memory
+
+        push: Push | None = self._push.Eval(context)
+        if push is None:
+            nulls = memory.nulls + 1
+            return replace(
+                memory, asked=pair.current.sequence, nulls=nulls, done=nulls >= parameters.null_frames
+            )
+        return replace(
+            memory,
+            push=push,
+            start_time=time,
+            offset=self._offset_from(push),
+            rest_since=None,
+            asked=pair.current.sequence,
+            nulls=0,
+            segmented_before=self._segmented(pair, context),
+        )
+
+    def _after_motion(self, memory: _Memory, time: float) -> _Memory:
+        assert memory.push is not None
+        assert memory.push.path is not None
+        if time < memory.start_time + memory.push.path.duration:
+            return memory
+        return replace(
+            memory, interaction_step=memory.interaction_step + 1, unjudged=memory.push, push=None
+        )
+
+    def _judge(self, memory: _Memory, pair: FramePair, context: Context) -> _Memory:
+        """Remember what the last push brought."""
+        assert memory.unjudged is not None
+        assert memory.segmented_before is not None
+        changed = self._segmented(pair, context).differs_from(
+            memory.segmented_before, self._parameters.unchanged_area
+        )
+        tried = TriedPush(memory.unjudged.p_WB, memory.unjudged.direction_W, changed)
+        return replace(memory, tried=(*memory.tried, tried), unjudged=None)
+
+    def _segmented(self, pair: FramePair, context: Context) -> SegmentedSoFar:
+        frame = pair.current
+        return segmented_so_far(self._mask.Eval(context), frame.depth, frame.intrinsics)
+
+    def _offset_from(self, push: Push) -> NDArray[np.float64]:
+        """How far the arm's command is from where a push's path begins."""
+        if push.path is None:
+            raise ValueError("the push has no path; give it one with plan_push_path")
+        offset = self._q_observe - push.path.position(0.0)
+        if np.abs(offset).max() > self._parameters.largest_jump:
+            raise ValueError(
+                f"the push's path begins {np.abs(offset).max():.3f} rad away from the observation posture, at "
+                f"most {self._parameters.largest_jump} is allowed; plan from the commanded position"
+            )
+        return offset

@@ -1,0 +1,69 @@
+"""PushPlanner: Alg. 3, FindAction, behind ports."""
+
+import numpy as np
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import Context, LeafSystem
+
+from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.pushing.plan_push import PushPlanningParameters, plan_push
+from riseg_drake.robot.kinematics import PandaKinematics
+
+
+class PushPlanner(LeafSystem):
+    """What to push next, given what is segmented by now. Works only when its output is asked for.
+
+    Inputs:
+        pair: FramePair; the push is planned in its current frame.
+        above_table: an object with `mask` bool [H, W], `height` float32 [H, W] in m and `plane_W` [4],
+            of the current frame (GetObjsAboveTable).
+        mask: L_t of the current frame, [H, W].
+        position: the arm's commanded joint angles [7]; where the path begins and ends.
+        tried_pushes: sequence of TriedPush; may be left unconnected.
+
+    Output:
+        push: Push with its path, or None when everything is segmented or no valid push exists.
+
+    The same inputs give the same push: the clustering's random numbers come from the seed and the
+    frame's sequence number.
+    """
+
+    def __init__(
+        self,
+        kinematics: PandaKinematics,
+        parameters: PushPlanningParameters | None = None,
+        seed: int = 0,
+    ):
+        super().__init__()
+        self._kinematics = kinematics
+        self._parameters = parameters or PushPlanningParameters()
+        self._seed = seed
+        anything = Value[object](None)
+        self._pair = self.DeclareAbstractInputPort("pair", anything)
+        self._above_table = self.DeclareAbstractInputPort("above_table", anything)
+        self._mask = self.DeclareAbstractInputPort("mask", anything)
+        self._position = self.DeclareVectorInputPort("position", 7)
+        self._tried = self.DeclareAbstractInputPort("tried_pushes", anything)
+        self.DeclareAbstractOutputPort(
+            "push",
+            alloc=lambda: Value[object](None),
+            calc=self._calc_push,
+            prerequisites_of_calc={self.all_input_ports_ticket()},
+        )
+
+    def _calc_push(self, context: Context, output: AbstractValue) -> None:
+        pair: FramePair = self._pair.Eval(context)
+        above_table = self._above_table.Eval(context)
+        frame = pair.current
+        push = plan_push(
+            frame,
+            above_table.mask,
+            above_table.height,
+            above_table.plane_W,
+            self._mask.Eval(context),
+            self._position.Eval(context),
+            self._kinematics,
+            np.random.default_rng([self._seed, frame.sequence]),
+            self._tried.Eval(context) if self._tried.HasValue(context) else (),
+            self._parameters,
+        )
+        output.set_value(push)
