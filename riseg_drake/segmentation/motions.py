@@ -14,7 +14,7 @@ from riseg_drake.segmentation.twists import fit_motion, point_precision
 
 _AHEAD = np.array([[0.0, 0.0, 0.4], [0.05, 0.0, 0.4], [0.0, 0.05, 0.4]])
 """Points to compare motions by, m, where there are no others."""
-_POINTS_MAX = 1500
+_POINTS_MAX = 400
 """A motion of six numbers needs no more points than that."""
 
 

@@ -68,6 +68,9 @@ class MaskPropagator(LeafSystem):
 
     @timed
     def _segment(self, context: Context, state: State, pair: FramePair) -> None:
-        inputs = (stage.Eval(context) for stage in self._stages)
-        following = segment(self._segmentation(context), pair, *inputs, self._parameters)
+        expected_flow, optical_flow, groups, above_0, above_1 = (s.Eval(context) for s in self._stages)
+        before = self._segmentation(context)
+        following = segment(
+            before, pair, expected_flow, optical_flow, groups, above_0, above_1, self._parameters
+        )
         state.get_mutable_abstract_state(self._state).set_value(following)
