@@ -64,9 +64,7 @@ class RenderedBodies:
         rng = np.random.default_rng(seed)
         builder = DiagramBuilder()
         self.plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 1e-3)
-        lights = [
-            LightParameter(type="directional", direction=[0.3, 0.4, -1], frame="world", intensity=0.8)
-        ]
+        lights = [LightParameter(type="directional", direction=[0.3, 0.4, -1], frame="world", intensity=0.8)]
         scene_graph.AddRenderer(
             "vtk",
             MakeRenderEngineVtk(RenderEngineVtkParams(lights=lights)),
@@ -120,9 +118,7 @@ class RenderedBodies:
             color = np.clip(color + rng.normal(0, 2.0, color.shape), 0, 255).astype(np.uint8)
             sigma = depth**2 * 0.08 / (645 * 0.055)
             noise = cv2.GaussianBlur(rng.normal(0, 1, depth.shape), (0, 0), 1.0) * 3.5
-            depth = np.where(depth > 0, np.round((depth + sigma * noise) * 1000) / 1000, 0).astype(
-                np.float32
-            )
+            depth = np.where(depth > 0, np.round((depth + sigma * noise) * 1000) / 1000, 0).astype(np.float32)
         frame = Frame(
             sequence=sequence,
             time=sequence / 15.0,
@@ -139,6 +135,6 @@ def _body_sdf(name: str, geometry: str, texture: Path | None, pose: str, static:
     texture_tag = f"<drake:diffuse_map>{texture.name}</drake:diffuse_map>" if texture else ""
     color = "1 1 1 1" if texture else "0.9 0.9 0.9 1"
     return f"""<sdf version="1.7"><model name="{name}"><static>{str(static).lower()}</static>
-    <link name="{name}"><inertial><mass>0.1</mass><inertia><ixx>1e-4</ixx><iyy>1e-4</iyy><izz>1e-4</izz></inertia></inertial>
+    <link name="{name}"><inertial><mass>0.1</mass></inertial>
     <visual name="v"><pose>{pose}</pose><geometry>{geometry}</geometry>
     <material><diffuse>{color}</diffuse>{texture_tag}</material></visual></link></model></sdf>"""

@@ -82,9 +82,7 @@ TOYS = [
         "cookie",
         disc(0, 0, 35),
         Profile(15, 9, 3, 10, 3),
-        grained(
-            spots(spots(plain("orange"), 9, 3.0, ["brown", "black"]), 5, 1.1, ["yellow", "cream"]), 0.15
-        ),
+        grained(spots(spots(plain("orange"), 9, 3.0, ["brown", "black"]), 5, 1.1, ["yellow", "cream"]), 0.15),
         850,
         0.75,
     ),
@@ -194,9 +192,7 @@ TOYS = [
         "orange",
         disc(0, 0, 34),
         Profile(46, 14, 9, 34, 13),
-        grained(
-            wedges(11, ["orange", "yellow", "orange"], "cream", [31, 34.5], ["cream", "orange"]), 0.25
-        ),
+        grained(wedges(11, ["orange", "yellow", "orange"], "cream", [31, 34.5], ["cream", "orange"]), 0.25),
         450,
     ),
     Toy(

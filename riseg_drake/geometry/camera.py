@@ -44,9 +44,33 @@ def rays(intrinsics: Intrinsics) -> NDArray[np.float32]:
     return directions
 
 
+def rays_at(uv: NDArray, intrinsics: Intrinsics) -> NDArray:
+    """The points at unit depth behind arbitrary pixels (u, v) [..., 2], [..., 3]."""
+    x = (uv[..., 0] - intrinsics.cx) / intrinsics.fx
+    y = (uv[..., 1] - intrinsics.cy) / intrinsics.fy
+    return np.stack([x, y, np.ones_like(x)], axis=-1)
+
+
 def back_project(depth: NDArray, intrinsics: Intrinsics) -> NDArray[np.float32]:
     """Points p_CQ [H, W, 3] in metres behind the pixels of a depth image [H, W]; 0 where invalid."""
     return rays(intrinsics) * depth[..., None].astype(np.float32)
+
+
+Region = tuple[slice, slice]
+"""A rectangle of an image: rows, columns."""
+
+
+def bounding_region(mask: NDArray[np.bool_], margin: int = 0) -> Region:
+    """The smallest rectangle around the pixels of a mask [H, W] that is not empty, and `margin` pixels."""
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    return (
+        slice(max(0, int(rows[0]) - margin), int(rows[-1]) + margin + 1),
+        slice(max(0, int(columns[0]) - margin), int(columns[-1]) + margin + 1),
+    )
+
+
+WHOLE: Region = (slice(None), slice(None))
+"""The region that is the whole image."""
 
 
 def project(p_CQ: NDArray, intrinsics: Intrinsics) -> NDArray:

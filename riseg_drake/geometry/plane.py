@@ -96,9 +96,7 @@ def heights_above_plane(depth: NDArray, intrinsics: Intrinsics, plane_C: NDArray
     n . p + d with p = depth * ray, and n . ray is linear in u and in v: no point is ever built.
     """
     n_x, n_y, n_z, d = (float(value) for value in plane_C)
-    along_u = (n_x * (np.arange(intrinsics.width) - intrinsics.cx) / intrinsics.fx + n_z).astype(
-        np.float32
-    )
+    along_u = (n_x * (np.arange(intrinsics.width) - intrinsics.cx) / intrinsics.fx + n_z).astype(np.float32)
     along_v = (n_y * (np.arange(intrinsics.height) - intrinsics.cy) / intrinsics.fy).astype(np.float32)
     height = along_u[None, :] + along_v[:, None]
     height *= depth

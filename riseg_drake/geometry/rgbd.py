@@ -1,6 +1,7 @@
 """What the algorithm sees at one moment: I_t with the kinematics that belong to it."""
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,8 +9,19 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.camera import Intrinsics
 
 
+class Immutable:
+    """Base of values that nobody changes once they are made, so that a copy may be the thing itself.
+
+    Drake copies the abstract state at every unrestricted update; images should not be copied with it.
+    """
+
+    def __deepcopy__(self, memo: dict) -> Self:
+        """The same value."""
+        return self
+
+
 @dataclass(frozen=True)
-class Frame:
+class Frame(Immutable):
     """The RGB-D image I_t, and what theta_t says of the same moment.
 
     Nobody writes into the arrays of a frame: several stages share them.
@@ -31,7 +43,7 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class FramePair:
+class FramePair(Immutable):
     """(I_t-1, I_t) with their kinematics; `reference` is the paper's t-1, `current` its t."""
 
     reference: Frame

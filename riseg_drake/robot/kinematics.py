@@ -142,7 +142,7 @@ class PandaKinematics:
         margin: float = LIMIT_MARGIN,
         min_clearance: float = MIN_CLEARANCE,
     ) -> list[NDArray[np.float64]] | None:
-        """Joint angles [7] for each pose X_WE [4, 4] of a path, without a jump; q_start is near the first.
+        """Joint angles [7] for poses X_WE [4, 4] of a path, without a jump; q_start is near the first.
 
         Newton steps on the pose; the spare freedom is spent on staying off the joints' limits. None
         where the path leaves the limits by `margin`, touches something, or cannot be followed. Poses

@@ -15,7 +15,7 @@ from riseg_drake.geometry.plane import (
     heights_above_plane,
     transform_plane,
 )
-from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.geometry.rgbd import Frame, Immutable
 
 
 @dataclass
@@ -32,7 +32,7 @@ class AboveTableParameters:
 
 
 @dataclass(frozen=True)
-class AboveTable:
+class AboveTable(Immutable):
     """objMask of one frame, and the table that it was measured from."""
 
     mask: NDArray[np.bool_]
@@ -48,13 +48,13 @@ class AboveTable:
 def objects_above_table(frame: Frame, parameters: AboveTableParameters) -> AboveTable:
     """Fit the table by RANSAC and mark what stands on it.
 
-    The hypotheses are drawn from a generator seeded by the frame's number: the same frame gives the
-    same answer, whoever asks and however often.
+    The hypotheses are drawn from a generator that starts anew each time: the same frame gives the same
+    answer, whoever asks and however often.
 
     Raises:
         ValueError: where no table is to be seen.
     """
-    rng = np.random.default_rng(frame.sequence)
+    rng = np.random.default_rng(0)
     seen = ~frame.robot
     plane_C = fit_plane(frame.depth, frame.intrinsics, rng, parameters.plane, valid=seen)
     height = heights_above_plane(frame.depth, frame.intrinsics, plane_C)

@@ -11,7 +11,6 @@ from riseg_drake.segmentation.body_frames import (
     BodyFrameParameters,
     BodyFrames,
     sample_body_frames,
-    track_points,
 )
 from riseg_drake.segmentation.effective_flow import MovingParameters, moving_pixels
 from riseg_drake.segmentation.grouping import GroupingParameters, group_twists, renumbered
@@ -66,16 +65,14 @@ def group_body_frames(
     moving = moving_pixels(pair, expected_flow, optical_flow, above_0.mask, noise, parameters.moving)
     if not moving.any():
         return no_groups()
-    p_C0Q0, p_C0Q1, depth_1 = track_points(pair, optical_flow)
-    frames = sample_body_frames(moving, p_C0Q0, p_C0Q1, depth_1, focal_length, parameters.frames, rng)
+    frames = sample_body_frames(pair, optical_flow, moving, parameters.frames, rng)
     if len(frames) < parameters.grouping.members_min:
         return no_groups()
     twists = _calc_bfifs(frames, above_0.depth_noise, focal_length, parameters)
+    frames, twists = _on_one_body(frames, twists, parameters.motions.misfit_max)
     group, motions = _settled_groups(frames, twists, above_0.depth_noise, focal_length, parameters)
     seeds = frames.p_C0Q0[:, 0]
-    spans = [
-        flow_difference(seeds[group == g], X, np.eye(4), focal_length) for g, X in enumerate(motions)
-    ]
+    spans = [flow_difference(seeds[group == g], X, np.eye(4), focal_length) for g, X in enumerate(motions)]
     return BFIFGroups(
         pixel=frames.pixel,
         V_S=twists.V_S,
@@ -86,6 +83,15 @@ def group_body_frames(
         p_C0Q=seeds,
         flow_span=max(spans, default=0.0),
     )
+
+
+def _on_one_body(frames: BodyFrames, twists: Twists, misfit_max: float) -> tuple[BodyFrames, Twists]:
+    """Without the frames that no rigid motion explains.
+
+    They lie across two bodies, are as near to the one's twist as to the other's, and would be a bridge.
+    """
+    rigid = twists.misfit <= misfit_max * max(1.0, float(np.median(twists.misfit)))
+    return frames.subset(rigid), twists.subset(rigid)
 
 
 def _settled_groups(

@@ -6,12 +6,11 @@ of t-1 (the motion of the camera taken out): `triplets` of the paper, or `patche
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import Intrinsics, back_project, pixel_grid
-from riseg_drake.geometry.rgbd import FramePair, unhidden_depth
+from riseg_drake.geometry.camera import rays, rays_at
+from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.geometry.se3 import inverse, move_points
 
 
@@ -21,7 +20,7 @@ class BodyFrameParameters:
 
     kind: str = "patches"
     """"patches" (least squares over many points) or "triplets" (three points, as in the paper)."""
-    count: int = 120
+    count: int = 100
     """How many body frames; the paper's n counts sampled pixels and is not given."""
     diameter: float = 0.024
     """d_a, m: no two points of one frame are further apart; not given in the paper."""
@@ -52,76 +51,84 @@ class BodyFrames:
         """The number of frames K."""
         return len(self.pixel)
 
+    def subset(self, which: NDArray[np.bool_]) -> "BodyFrames":
+        """Some of the body frames."""
+        return BodyFrames(
+            self.pixel[which],
+            self.p_C0Q0[which],
+            self.p_C0Q1[which],
+            self.depth_1[which],
+            self.used[which],
+        )
+
 
 def track_points(
-    pair: FramePair, optical_flow: NDArray[np.float32]
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """Every pixel's point at t-1 and at t, both in C0: p_C0Q0, p_C0Q1 [H, W, 3], and its depth at t.
+    pair: FramePair,
+    optical_flow: NDArray[np.float32],
+    pixel: tuple[NDArray[np.intp], NDArray[np.intp]],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """The points behind some pixels (v, u) of t-1, where they are at t, and how far away they are then.
 
     Depth at t is looked up where O_t (not X_t) leads, at the nearest pixel so that no depth is mixed
-    across an edge, and carried back by the inverse camera motion. 0 depth marks what cannot be tracked.
+    across an edge, and carried back by the inverse camera motion.
+
+    Returns:
+        p_C0Q0 and p_C0Q1 [..., 3], m, both in C0, and the depth at t [...], 0 where there is none.
     """
     intrinsics = pair.current.intrinsics
-    target = pixel_grid(*intrinsics.shape) + optical_flow
-    depth_1 = cv2.remap(unhidden_depth(pair.current), target, None, cv2.INTER_NEAREST, borderValue=0)
-    p_C1Q1 = _rays_at(target, intrinsics) * depth_1[..., None]
-    p_C0Q1 = move_points(inverse(pair.X_C1C0), p_C1Q1)
-    p_C0Q0 = back_project(pair.reference.depth, intrinsics)
-    return p_C0Q0, p_C0Q1, np.where(pair.reference.depth > 0, depth_1, np.float32(0))
+    v, u = pixel
+    p_C0Q0 = rays(intrinsics)[v, u] * pair.reference.depth[v, u][..., None].astype(float)
+    target = np.stack([u, v], axis=-1) + optical_flow[v, u].astype(float)
+    u_1, v_1 = np.moveaxis(np.rint(target).astype(np.intp), -1, 0)
+    inside = (u_1 >= 0) & (v_1 >= 0) & (u_1 < intrinsics.width) & (v_1 < intrinsics.height)
+    u_1, v_1 = np.where(inside, u_1, 0), np.where(inside, v_1, 0)
+    seen = inside & ~pair.current.robot[v_1, u_1] & (p_C0Q0[..., 2] > 0)
+    depth_1 = np.where(seen, pair.current.depth[v_1, u_1], 0.0)
+    p_C1Q1 = rays_at(target, intrinsics) * depth_1[..., None]
+    return p_C0Q0, move_points(inverse(pair.X_C1C0), p_C1Q1), depth_1
 
 
 def sample_body_frames(
+    pair: FramePair,
+    optical_flow: NDArray[np.float32],
     moving: NDArray[np.bool_],
-    p_C0Q0: NDArray[np.float32],
-    p_C0Q1: NDArray[np.float32],
-    depth_1: NDArray[np.float32],
-    focal_length: float,
     parameters: BodyFrameParameters,
     rng: np.random.Generator,
 ) -> BodyFrames:
     """Random body frames on moving pixels: not collinear, no wider than d_a (Alg. 2, line 4).
 
     Args:
+        pair: the frames of t-1 and t.
+        optical_flow: O_t [H, W, 2], pixels.
         moving: [H, W], ||X_t|| >> 0.
-        p_C0Q0: [H, W, 3] and
-        p_C0Q1: [H, W, 3], tracked points, m.
-        depth_1: [H, W], depth of p_C0Q1 at t, 0 = not tracked.
-        focal_length: pixels; with the depth it turns d_a into pixels.
         parameters: see there; ValueError for an unknown kind.
         rng: draws seeds and neighbours.
     """
     if parameters.kind not in ("patches", "triplets"):
         raise ValueError(f"no body frames {parameters.kind!r}: choose patches or triplets")
-    good = moving & (depth_1 > 0) & (p_C0Q0[..., 2] > 0)
+    good = moving & (pair.reference.depth > 0)
     seeds = _spread_seeds(good, parameters.count, rng)
     is_triplet = parameters.kind == "triplets"
     neighbours = 2 if is_triplet else parameters.points - 1
     height, width = good.shape
 
     # Neighbours lie uniformly in a disk of radius d_a / 2 about the seed, so all are within d_a.
-    z = p_C0Q0[seeds[:, 0], seeds[:, 1], 2]
-    radius = 0.5 * parameters.diameter * focal_length / np.maximum(z, 1e-3)
+    z = pair.reference.depth[seeds[:, 0], seeds[:, 1]]
+    radius = 0.5 * parameters.diameter * pair.current.intrinsics.fx / z
     r = radius[:, None] * np.sqrt(rng.uniform(0.01, 1, (len(seeds), neighbours)))
     phi = rng.uniform(0, 2 * np.pi, (len(seeds), neighbours))
-    offset = np.stack([r * np.sin(phi), r * np.cos(phi)], axis=-1)
-    vu = seeds[:, None] + np.concatenate([np.zeros((len(seeds), 1, 2)), np.rint(offset)], 1).astype(int)
+    offset = np.rint(np.stack([r * np.sin(phi), r * np.cos(phi)], axis=-1)).astype(np.intp)
+    vu = seeds[:, None] + np.concatenate([np.zeros((len(seeds), 1, 2), np.intp), offset], axis=1)
     inside = (vu >= 0).all(-1) & (vu[..., 0] < height) & (vu[..., 1] < width)
     v, u = np.clip(vu[..., 0], 0, height - 1), np.clip(vu[..., 1], 0, width - 1)
 
-    p_0, p_1 = p_C0Q0[v, u].astype(float), p_C0Q1[v, u].astype(float)
-    near = np.linalg.norm(p_0 - p_0[:, :1], axis=-1) <= 0.5 * parameters.diameter * 1.2
-    used = inside & good[v, u] & near
+    p_0, p_1, depth_1 = track_points(pair, optical_flow, (v, u))
+    # A little more than the radius in the image: points may differ in depth, too.
+    near = np.linalg.norm(p_0 - p_0[:, :1], axis=-1) <= 0.6 * parameters.diameter
+    used = inside & good[v, u] & (depth_1 > 0) & near
     enough = used.sum(1) >= (3 if is_triplet else parameters.points_min)
-    keep = enough & (_extent_ratio(p_0, used) >= parameters.width_min)
-    return BodyFrames(seeds[keep], p_0[keep], p_1[keep], depth_1[v, u][keep].astype(float), used[keep])
-
-
-def _rays_at(uv: NDArray[np.float32], intrinsics: Intrinsics) -> NDArray[np.float32]:
-    """Points at unit depth behind arbitrary pixels [..., 2]."""
-    ray = np.ones((*uv.shape[:-1], 3), np.float32)
-    ray[..., 0] = (uv[..., 0] - np.float32(intrinsics.cx)) * np.float32(1 / intrinsics.fx)
-    ray[..., 1] = (uv[..., 1] - np.float32(intrinsics.cy)) * np.float32(1 / intrinsics.fy)
-    return ray
+    keep = enough & used[:, 0] & (_extent_ratio(p_0, used) >= parameters.width_min)
+    return BodyFrames(seeds[keep], p_0[keep], p_1[keep], depth_1[keep], used[keep])
 
 
 def _spread_seeds(good: NDArray[np.bool_], count: int, rng: np.random.Generator) -> NDArray[np.intp]:

@@ -11,9 +11,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import pixel_grid
+from riseg_drake.geometry.camera import Region, bounding_region, pixel_grid
 from riseg_drake.geometry.rgbd import FramePair
-from riseg_drake.segmentation.noise import MeasurementNoise
+from riseg_drake.segmentation.noise import MeasurementNoise, gray_variance, smooth_gray
+
+_COST_MAX = np.float32(25)
+"""Squared normalised residuals count no more than that."""
 
 
 @dataclass
@@ -44,18 +47,24 @@ def moving_pixels(
     parameters: MovingParameters,
 ) -> NDArray[np.bool_]:
     """||X_t|| >> 0 [H, W]: what moves of its own, in the view of t-1."""
-    X_t = effective_flow(optical_flow, expected_flow)
-    with np.errstate(invalid="ignore"):
-        moving = above_0 & ((X_t**2).sum(-1) > parameters.flow_min**2)
-    pixels_per_metre = _pixels_per_metre(pair, above_0)
+    moving = np.zeros_like(above_0)
+    if not above_0.any():
+        return moving
+    depth = pair.reference.depth[above_0]
+    pixels_per_metre = pair.current.intrinsics.fx / max(float(np.median(depth)), 1e-3)
     pixels_min = parameters.area_min * pixels_per_metre**2
-    if np.count_nonzero(moving) < pixels_min:
-        return np.zeros_like(moving)
-    size = 2 * max(1, round(0.5 * parameters.window * pixels_per_metre)) + 1
-    evidence = zero_motion_evidence(pair, expected_flow, optical_flow, noise, size)
-    moving &= evidence > parameters.evidence_min
-    if np.count_nonzero(moving) < pixels_min:
-        return np.zeros_like(moving)
+    window = 2 * max(1, round(0.5 * parameters.window * pixels_per_metre)) + 1
+
+    region = bounding_region(above_0, margin=window)
+    X_t = effective_flow(optical_flow[region], expected_flow[region])
+    with np.errstate(invalid="ignore"):
+        candidate = above_0[region] & ((X_t**2).sum(-1) > parameters.flow_min**2)
+    if np.count_nonzero(candidate) < pixels_min:
+        return moving
+    evidence = zero_motion_evidence(pair, expected_flow, optical_flow, region, noise, window)
+    candidate &= evidence > parameters.evidence_min
+    if np.count_nonzero(candidate) >= pixels_min:
+        moving[region] = candidate
     return moving
 
 
@@ -63,30 +72,20 @@ def zero_motion_evidence(
     pair: FramePair,
     expected_flow: NDArray[np.float32],
     optical_flow: NDArray[np.float32],
+    region: Region,
     noise: MeasurementNoise,
     window: int,
 ) -> NDArray[np.float32]:
-    """How much worse E_t explains the two images than O_t does, [H, W], averaged over a window.
+    """How much worse E_t explains the two images than O_t does, averaged over a window of pixels.
 
-    The difference of the squared gray residuals over their variance: about 0 where nothing moves, or
-    where there is no texture to tell; negative never means anything.
+    The difference of the squared gray residuals over their variance, [h, w] of a region: about 0 where
+    nothing moves, or where there is no texture to tell.
     """
-    I_0, I_1 = (
-        cv2.GaussianBlur(cv2.cvtColor(c, cv2.COLOR_RGB2GRAY), (0, 0), 0.7).astype(np.float32)
-        for c in (pair.reference.color, pair.current.color)
-    )
-    gradient_squared = cv2.Sobel(I_0, cv2.CV_32F, 1, 0, scale=0.125) ** 2
-    gradient_squared += cv2.Sobel(I_0, cv2.CV_32F, 0, 1, scale=0.125) ** 2
-    variance = 2 * noise.color**2 + noise.registration**2 * gradient_squared
-    uv = pixel_grid(*I_0.shape)
+    I_0, I_1 = smooth_gray(pair.reference.color[region]), smooth_gray(pair.current.color)
+    variance = gray_variance(I_0, noise)
+    uv = pixel_grid(*pair.current.intrinsics.shape)[region]
     worse = np.zeros_like(I_0)
-    for sign, flow in ((1.0, np.nan_to_num(expected_flow)), (-1.0, optical_flow)):
+    for sign, flow in ((1.0, np.nan_to_num(expected_flow[region])), (-1.0, optical_flow[region])):
         warped = cv2.remap(I_1, uv + flow, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        worse += np.float32(sign) * np.minimum((warped - I_0) ** 2 / variance, 25.0)
+        worse += np.float32(sign) * np.minimum((warped - I_0) ** 2 / variance, _COST_MAX)
     return cv2.boxFilter(worse, -1, (window, window))
-
-
-def _pixels_per_metre(pair: FramePair, above_0: NDArray[np.bool_]) -> float:
-    depth = pair.reference.depth[above_0]
-    depth = depth[depth > 0]
-    return pair.current.intrinsics.fx / float(np.median(depth)) if len(depth) else 0.0

@@ -31,9 +31,12 @@ class GroupingParameters:
 
 def mahalanobis_own(V: NDArray, covariance: NDArray) -> NDArray[np.float64]:
     """Distances [K, K] of twists [K, 6], each pair measured by the sum of its two covariances."""
-    precision = np.linalg.inv(covariance[:, None] + covariance[None])
-    difference = V[:, None] - V[None]
-    return np.sqrt(np.einsum("abi,abij,abj->ab", difference, precision, difference).clip(0))
+    a, b = np.triu_indices(len(V), 1)
+    difference = (V[a] - V[b])[..., None]
+    squared = difference.swapaxes(1, 2) @ np.linalg.solve(covariance[a] + covariance[b], difference)
+    distance = np.zeros((len(V), len(V)))
+    distance[a, b] = distance[b, a] = np.sqrt(squared[:, 0, 0].clip(0))
+    return distance
 
 
 def mahalanobis_sample(V: NDArray) -> NDArray[np.float64]:

@@ -11,12 +11,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import back_project, pixel_grid
+from riseg_drake.geometry.camera import Region, bounding_region, pixel_grid, rays
 from riseg_drake.geometry.rgbd import FramePair, unhidden_depth
-from riseg_drake.geometry.se3 import move_points
 from riseg_drake.segmentation.expected_flow import flow_of_motion
 from riseg_drake.segmentation.motions import BFIFGroups
-from riseg_drake.segmentation.noise import MeasurementNoise, depth_sigma
+from riseg_drake.segmentation.noise import (
+    MeasurementNoise,
+    depth_sigma,
+    gray_variance,
+    smooth_gray,
+)
 
 STILL = 0
 UNDECIDED = -1
@@ -93,7 +97,7 @@ def label_by_motion(
     out = np.zeros(above_0.shape, np.int16)
     if not len(motions) or not above_0.any():
         return out
-    region = _bounding_box(above_0, margin=8)
+    region = bounding_region(above_0, margin=8)
     cost = motion_costs(pair, region, motions, noise, depth_noise, parameters)
     z = float(np.median(pair.reference.depth[above_0]))
     radius = max(1, round(0.5 * parameters.window * pair.current.intrinsics.fx / max(z, 1e-3)))
@@ -109,7 +113,7 @@ def label_by_motion(
 
 def motion_costs(
     pair: FramePair,
-    region: tuple[slice, slice],
+    region: Region,
     motions: NDArray[np.float64],
     noise: MeasurementNoise,
     depth_noise: float,
@@ -122,27 +126,20 @@ def motion_costs(
     """
     reference, current = pair.reference, pair.current
     intrinsics = current.intrinsics
-    gray_0, gray_1 = (
-        cv2.cvtColor(c, cv2.COLOR_RGB2GRAY).astype(np.float32) for c in (reference.color, current.color)
-    )
-    gray_0 = cv2.GaussianBlur(gray_0, (0, 0), 0.7)
-    gray_1 = cv2.GaussianBlur(gray_1, (0, 0), 0.7)
+    I_0, gray_1 = smooth_gray(reference.color[region]), smooth_gray(current.color)
+    variance = gray_variance(I_0, noise)
     depth = reference.depth[region]
     depth_1, robot_1 = unhidden_depth(current), current.robot.astype(np.uint8)
-    I_0 = gray_0[region]
-    gradient_squared = cv2.Sobel(I_0, cv2.CV_32F, 1, 0, scale=0.125) ** 2
-    gradient_squared += cv2.Sobel(I_0, cv2.CV_32F, 0, 1, scale=0.125) ** 2
-    variance = 2 * noise.color**2 + noise.registration**2 * gradient_squared
-    p_C0Q = back_project(reference.depth, intrinsics)[region]
+    ray = rays(intrinsics)[region]
     uv = pixel_grid(*intrinsics.shape)[region]
     cost = []
     for motion in (np.eye(4), *motions):
         X = pair.X_C1C0 @ motion
-        target = uv + flow_of_motion(reference.depth, X, intrinsics)[region]
+        target = uv + flow_of_motion(reference.depth, X, intrinsics, region)
         I_1 = cv2.remap(gray_1, target, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         z_1 = cv2.remap(depth_1, target, None, cv2.INTER_NEAREST, borderValue=0)
         hidden = cv2.remap(robot_1, target, None, cv2.INTER_NEAREST, borderValue=1) > 0
-        z_expected = move_points(X, p_C0Q)[..., 2]
+        z_expected = depth * (ray @ X[2, :3].astype(np.float32)) + np.float32(X[2, 3])
         photometric = np.minimum((I_1 - I_0) ** 2 / variance, parameters.cost_max)
         squared = (z_1 - z_expected) ** 2 / (2 * depth_sigma(z_expected, depth_noise) ** 2)
         geometric = np.where(z_1 > 0, np.minimum(squared, parameters.cost_max), 1.0)
@@ -196,11 +193,3 @@ def _nearest_seed_group(
     value = np.zeros(index.max() + 1, np.intp)
     value[index[seeds[:, 0], seeds[:, 1]]] = group
     return value[index]
-
-
-def _bounding_box(mask: NDArray[np.bool_], margin: int) -> tuple[slice, slice]:
-    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    return (
-        slice(max(0, rows[0] - margin), rows[-1] + margin + 1),
-        slice(max(0, columns[0] - margin), columns[-1] + margin + 1),
-    )

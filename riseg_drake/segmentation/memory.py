@@ -71,9 +71,7 @@ def remember(
     p_WQ = move_points(reference.X_WC, p_C0Q[visible].astype(float))
     owner = label[visible]
     ids = np.union1d(np.unique(owner), list(memory)).astype(int)
-    everything = {
-        int(a): np.concatenate([memory.get(int(a), np.empty((0, 3))), p_WQ[owner == a]]) for a in ids
-    }
+    everything = {int(a): np.concatenate([memory.get(int(a), np.empty((0, 3))), p_WQ[owner == a]]) for a in ids}
     hidden = {}
     for a, points in moved_memory(everything, motion_of, reference.X_WC).items():
         out_of_sight = points[_out_of_sight(points, current)]

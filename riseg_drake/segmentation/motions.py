@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.geometry.rgbd import Immutable
 from riseg_drake.geometry.se3 import exp_se3, move_points, translation
 from riseg_drake.segmentation.body_frames import BodyFrames
 from riseg_drake.segmentation.noise import MeasurementNoise
@@ -13,7 +14,7 @@ from riseg_drake.segmentation.twists import fit_motion, point_precision
 
 _AHEAD = np.array([[0.0, 0.0, 0.4], [0.05, 0.0, 0.4], [0.0, 0.05, 0.4]])
 """Points to compare motions by, m, where there are no others."""
-_POINTS_MAX = 1500
+_POINTS_MAX = 400
 """A motion of six numbers needs no more points than that."""
 
 
@@ -33,7 +34,7 @@ class MotionParameters:
 
 
 @dataclass(frozen=True)
-class BFIFGroups:
+class BFIFGroups(Immutable):
     """G_t: the body frames, the group of each, and the motion of each group."""
 
     pixel: NDArray[np.intp]
@@ -159,9 +160,7 @@ def merge_equal_motions(
 def motion_gaps(p_C0Q: NDArray, motions: NDArray, focal_length: float) -> NDArray[np.float64]:
     """Pixels by which standing still (index 0) and the motions [G, 4, 4] differ, [1 + G, 1 + G]."""
     all_motions = [np.eye(4), *motions]
-    return np.array(
-        [[flow_difference(p_C0Q, X, Y, focal_length) for Y in all_motions] for X in all_motions]
-    )
+    return np.array([[flow_difference(p_C0Q, X, Y, focal_length) for Y in all_motions] for X in all_motions])
 
 
 def with_earlier_motions(

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import Intrinsics, back_project, project
+from riseg_drake.geometry.camera import Intrinsics, bounding_region, project, rays
 from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.geometry.se3 import inverse, move_points
 from riseg_drake.segmentation.association import UNKNOWN
@@ -46,17 +46,19 @@ def carry_labels(
     current = pair.current
     vu = np.nonzero(above_1)
     z_1 = current.depth[vu]
-    p_C1Q = back_project(current.depth, current.intrinsics)[vu]
+    p_C1Q = rays(current.intrinsics)[vu] * z_1[:, None]
     label = np.zeros(len(z_1), np.uint16)
     gap = np.full(len(z_1), _DEPTH_AGREES, np.float32)
     X_C0C1 = inverse(pair.X_C1C0)
 
-    moving_ids = np.zeros(65536, bool)
-    moving_ids[list(motion_of)] = True
+    still = np.ones(65536, bool)
+    still[[0, *motion_of]] = False
     for ids, motion in _by_motion(motion_of):
         p_C0Q = move_points(inverse(motion) @ X_C0C1, p_C1Q)
         found, apart = _look_up(p_C0Q, label_0, pair.reference)
-        agrees = np.isin(found, ids) if ids else (found > 0) & ~moving_ids[found]
+        moves = np.zeros(65536, bool)
+        moves[ids] = True
+        agrees = moves[found] if ids else still[found]
         better = (z_1 > 0) & agrees & (apart < gap)
         label[better] = found[better]
         gap[better] = apart[better]
@@ -69,26 +71,26 @@ def carry_labels(
     return nearest_label(out, above_1, reach)
 
 
-def nearest_label(
-    label: NDArray[np.uint16], inside: NDArray[np.bool_], reach: float
-) -> NDArray[np.uint16]:
+def nearest_label(label: NDArray[np.uint16], inside: NDArray[np.bool_], reach: float) -> NDArray[np.uint16]:
     """Give each unlabelled pixel inside the label nearest to it, UNKNOWN beyond `reach` pixels.
 
     Objects that come into view, or are put there, must not become part of their neighbours.
     """
-    empty = inside & (label == 0)
-    if not empty.any():
+    if not inside.any():
         return label
-    out = label.copy()
-    out[empty] = UNKNOWN
-    if label.any():
+    region = bounding_region(inside, margin=1)
+    out, old = label.copy(), label[region]
+    empty = inside[region] & (old == 0)
+    filled = np.where(empty, UNKNOWN, old)
+    if empty.any() and old.any():
         distance, index = cv2.distanceTransformWithLabels(
-            (label == 0).astype(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
+            (old == 0).astype(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
         )
         value = np.zeros(index.max() + 1, np.uint16)
-        value[index[label > 0]] = label[label > 0]
+        value[index[old > 0]] = old[old > 0]
         near = empty & (distance <= reach)
-        out[near] = value[index[near]]
+        filled[near] = value[index[near]]
+    out[region] = filled
     return out
 
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import back_project, pixel_grid
-from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.geometry.camera import back_project, bounding_region, pixel_grid
+from riseg_drake.geometry.rgbd import FramePair, Immutable
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.association import (
     UNKNOWN,
@@ -47,7 +47,7 @@ class SegmentParameters:
 
 
 @dataclass(frozen=True)
-class Segmentation:
+class Segmentation(Immutable):
     """L_t, and what must be remembered for L_t+1: the propagator's one state."""
 
     sequence: int
@@ -211,7 +211,7 @@ def _decide(
     parameters: SegmentParameters,
 ) -> Segmentation:
     """Labels at the reference frame in the light of what moves."""
-    if not len(motions):
+    if not len(motions) or not now.known.label.any():
         return replace(now, decided=now.known.label, motion_of={})
     if parameters.ids == "fresh":
         fresh = np.where(moving > 0, moving + (now.next_id - 1), 0).astype(np.uint16)
@@ -225,18 +225,21 @@ def _decide(
         )
     z = pair.reference.depth[above_0.mask]
     pixels_per_metre = pair.current.intrinsics.fx / float(np.median(z[z > 0]))
+    region = bounding_region(now.known.label > 0, margin=1)
     association = associate(
-        now.known,
-        moving,
-        now.decided if now.sequence > now.reference_sequence else None,
+        replace(now.known, label=now.known.label[region]),
+        moving[region],
+        now.decided[region] if now.sequence > now.reference_sequence else None,
         motion_gaps(_points(groups, pair, above_0), motions, pair.current.intrinsics.fx),
         now.episode,
         pixels_per_metre,
         parameters.association,
     )
+    decided = now.known.label.copy()
+    decided[region] = association.label
     return replace(
         now,
-        decided=association.label,
+        decided=decided,
         motion_of={a: motions[g] for a, g in association.motion_of.items()},
         born=association.born,
         next_id=max(association.next_id, now.next_id),

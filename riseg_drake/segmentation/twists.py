@@ -101,9 +101,7 @@ def point_precision(
     """Inverse covariance [..., 3, 3] of a point's displacement: flow noise across, depth along the ray."""
     z = np.maximum(p_CQ[..., 2], 1e-3)
     across = (z * flow_noise / focal_length) ** -2.0
-    along = 1.0 / (
-        depth_sigma(z, depth_noise) ** 2 + depth_sigma(np.maximum(depth_1, z), depth_noise) ** 2
-    )
+    along = 1.0 / (depth_sigma(z, depth_noise) ** 2 + depth_sigma(np.maximum(depth_1, z), depth_noise) ** 2)
     ray = p_CQ / np.maximum(np.linalg.norm(p_CQ, axis=-1, keepdims=True), 1e-9)
     return across[..., None, None] * np.eye(3) + (along - across)[..., None, None] * (
         ray[..., :, None] * ray[..., None, :]

@@ -1,4 +1,4 @@
-"""What a model covers of the table, as convex polygons, how far they can slide, how far they stand apart."""
+"""What a model covers of the table, as convex polygons; how far two such shapes stand apart."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -87,30 +87,25 @@ def shape_corners(shape: Shape) -> NDArray:
     """Points [n, 3] whose convex hull is the shape, or very nearly."""
     match shape:
         case Box():
-            half = 0.5 * shape.size()
+            half = np.asarray(shape.size()) / 2
             return np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
         case Sphere():
             return _SPHERE * shape.radius()
         case Ellipsoid():
             return _SPHERE * (shape.a(), shape.b(), shape.c())
         case Cylinder():
-            half = 0.5 * shape.length()
+            top = 0.5 * shape.length()
             return np.vstack(
-                [
-                    np.column_stack([_CIRCLE * shape.radius(), np.full(len(_CIRCLE), z)])
-                    for z in (-half, half)
-                ]
+                [np.column_stack([_CIRCLE * shape.radius(), np.full(len(_CIRCLE), z)]) for z in (-top, top)]
             )
         case Capsule():
-            half = np.array([0.0, 0.0, 0.5 * shape.length()])
-            return np.vstack([_SPHERE * shape.radius() - half, _SPHERE * shape.radius() + half])
+            top_xyz = np.array([0.0, 0.0, 0.5 * shape.length()])
+            return np.vstack([_SPHERE * shape.radius() - top_xyz, _SPHERE * shape.radius() + top_xyz])
         case Convex() | Mesh():
             hull = shape.GetConvexHull()
             return np.array([hull.vertex(i) for i in range(hull.num_vertices())])
         case HalfSpace():
-            raise ValueError(
-                "a half space as collision geometry has no extent; a box or a mesh would do"
-            )
+            raise ValueError("a half space as collision geometry has no extent; a box or a mesh would do")
         case _:
             raise ValueError(f"collision geometry of type {type(shape).__name__} is not supported")
 

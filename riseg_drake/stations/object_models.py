@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydrake.geometry import SceneGraph, Sphere
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import PackageMap, Parser
-from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 from scipy.spatial import ConvexHull
 
@@ -37,6 +37,8 @@ class ObjectModel:
     """Of the body in its modelled pose, about its origin."""
     feet: NDArray
     """Centres p_BF [k, 3] of balls to be added below a flat underside; none where it needs none."""
+    foot_friction: CoulombFriction
+    """Of those balls: that of the geometry they stand for."""
 
 
 def find_models(folder_or_url: str, names: Sequence[str] = ()) -> list[ObjectModel]:
@@ -45,9 +47,7 @@ def find_models(folder_or_url: str, names: Sequence[str] = ()) -> list[ObjectMod
     A `package://` URL may be given for the folder. `names` selects some of them. Raises SceneError.
     """
     folder = _resolve(folder_or_url)
-    found = [
-        path for end in ("sdf", "urdf") for deep in ("", "*/") for path in folder.glob(f"{deep}*.{end}")
-    ]
+    found = [path for end in ("sdf", "urdf") for deep in ("", "*/") for path in folder.glob(f"{deep}*.{end}")]
     if not found:
         raise SceneError(
             f"objects: no models in {folder}; expected *.sdf or *.urdf files, there or one folder down"
@@ -64,18 +64,16 @@ def find_models(folder_or_url: str, names: Sequence[str] = ()) -> list[ObjectMod
     return [measure(name, paths[name]) for name in sorted(names or paths)]
 
 
-def parse_body(plant: MultibodyPlant, name: str, path: Path) -> RigidBody:
-    """Add a model of one body to a plant under a name of its own. Raises SceneError."""
+def parse_body(plant: MultibodyPlant, path: Path) -> RigidBody:
+    """Add a model of one body to a plant, renamed where its name is taken. Raises SceneError."""
     parser = Parser(plant)
     parser.SetAutoRenaming(True)
-    parser.package_map().Add("riseg_drake_models", str(files("riseg_drake.models")))
+    parser.package_map().Add("riseg_drake_models", Path(str(files("riseg_drake.models"))))
     try:
-        instances = parser.AddModels(str(path))
+        instances = parser.AddModels(path)
     except RuntimeError as error:
         raise SceneError(f"{path} cannot be read: {' '.join(str(error).split())}") from error
-    bodies = [
-        plant.get_body(index) for instance in instances for index in plant.GetBodyIndices(instance)
-    ]
+    bodies = [plant.get_body(index) for instance in instances for index in plant.GetBodyIndices(instance)]
     if len(bodies) != 1:
         raise SceneError(f"{path} has {len(bodies)} bodies; an object of a scene is a single rigid body")
     return bodies[0]
@@ -86,20 +84,18 @@ def measure(name: str, path: Path) -> ObjectModel:
     scene_graph = SceneGraph()
     plant = MultibodyPlant(0.002)
     plant.RegisterAsSourceForSceneGraph(scene_graph)
-    body = parse_body(plant, name, path)
+    body = parse_body(plant, path)
     plant.Finalize()
     if not body.is_floating_base_body():
         raise SceneError(f"{path} is fixed to the world; an object of a scene must be free to move")
     if not body.default_mass() > 0:
-        raise SceneError(
-            f"{path} has mass {body.default_mass():g}; an object needs a positive mass in kg"
-        )
+        raise SceneError(f"{path} has mass {body.default_mass():g}; an object needs a positive mass in kg")
     geometries = plant.GetCollisionGeometriesForBody(body)
     if not geometries:
         raise SceneError(f"{path} has no collision geometry; without it nothing can push the object")
     inspector = scene_graph.model_inspector()
     R_WB = plant.GetDefaultFloatingBaseBodyPose(body).rotation()
-    X_WB = RigidTransform(R_WB, np.zeros(3))
+    X_WB = RigidTransform(R_WB)
     try:
         outline = footprint(inspector, geometries, X_WB)
         lowest = [
@@ -113,7 +109,8 @@ def measure(name: str, path: Path) -> ObjectModel:
     p_BF = R_WB.inverse().multiply(feet.T).T if len(feet) else feet
     if len(feet):
         outline = Footprint(outline.pieces, float(feet[:, 2].min()) - FOOT_RADIUS)
-    return ObjectModel(name, path, X_WB, outline, p_BF)
+    friction = inspector.GetProximityProperties(geometries[0]).GetProperty("material", "coulomb_friction")
+    return ObjectModel(name, path, X_WB, outline, p_BF, friction)
 
 
 def _feet(corners: NDArray, bottom: float) -> NDArray:
@@ -142,7 +139,7 @@ def _resolve(folder_or_url: str) -> Path:
         folder = Path(folder_or_url).expanduser()
     else:
         packages = PackageMap()
-        packages.Add("riseg_drake_models", str(files("riseg_drake.models")))
+        packages.Add("riseg_drake_models", Path(str(files("riseg_drake.models"))))
         try:
             folder = Path(packages.ResolveUrl(folder_or_url))
         except RuntimeError as error:

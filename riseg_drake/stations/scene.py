@@ -32,6 +32,7 @@ __all__ = ["PlacedObject", "SceneConfig", "SceneError", "add_scene", "draw_scene
 
 TABLE_FRICTION = CoulombFriction(0.5, 0.5)
 DROP = 2e-4  # m; how far above its resting height an object starts
+CLEAR = 1e-4  # m; smallest gap, so that nothing starts inside its neighbour
 TRIES = 24  # ways to approach the cluster that are compared for each object
 LAYOUTS = 20  # whole layouts tried before a scene is called impossible
 STILL = (2e-4, 2e-3)  # m/s and rad/s below which an object is at rest
@@ -66,13 +67,20 @@ class SceneConfig:
 
 @dataclass(frozen=True)
 class PlacedObject:
-    """One object of a scene, at rest."""
+    """One object of a scene."""
 
-    name: str
-    model_path: Path
+    model: ObjectModel
     X_WB: RigidTransform
-    feet: NDArray
-    """Centres p_BF [k, 3] of balls that are added below a flat underside (see object_models)."""
+
+    @property
+    def name(self) -> str:
+        """Name of the model, by its file."""
+        return self.model.name
+
+    @property
+    def model_path(self) -> Path:
+        """The SDF or URDF file."""
+        return self.model.path
 
 
 def draw_scene(config: SceneConfig, rng: np.random.Generator) -> list[PlacedObject]:
@@ -97,9 +105,7 @@ def draw_scene(config: SceneConfig, rng: np.random.Generator) -> list[PlacedObje
         if not restless:
             return settled
     if restless:
-        raise SceneError(
-            f"{restless}; model it with z up, standing on a face or on three points or more"
-        )
+        raise SceneError(f"{restless}; model it with z up, standing on a face or on three points or more")
     raise SceneError(
         f"{count} objects ({', '.join(model.name for model in chosen)}) do not fit within "
         f"{config.radius:g} m of the middle; ask for fewer, smaller ones, or enlarge radius"
@@ -113,10 +119,14 @@ def add_scene(plant: MultibodyPlant, placed: Sequence[PlacedObject]) -> dict[int
     """
     bodies = {}
     for object_id, item in enumerate(placed, start=1):
-        body = parse_body(plant, item.name, item.model_path)
-        for k, p_BF in enumerate(item.feet):
+        body = parse_body(plant, item.model_path)
+        for k, p_BF in enumerate(item.model.feet):
             plant.RegisterCollisionGeometry(
-                body, RigidTransform(p_BF), Sphere(FOOT_RADIUS), f"added_foot_{k}", _foot_properties()
+                body,
+                RigidTransform(p_BF),
+                Sphere(FOOT_RADIUS),
+                f"added_foot_{k}",
+                _foot_properties(item.model.foot_friction),
             )
         plant.SetDefaultFloatingBaseBodyPose(body, item.X_WB)
         bodies[object_id] = body.index()
@@ -141,7 +151,7 @@ def settle(placed: Sequence[PlacedObject], config: SceneConfig) -> list[PlacedOb
     plant.set_contact_model(ContactModel.kPoint)
     plant.set_discrete_contact_approximation(DiscreteContactApproximation.kLagged)
     table = Box(4.0, 4.0, 0.5)
-    X_WT = RigidTransform([config.centre_W[0], config.centre_W[1], -0.25])
+    X_WT = RigidTransform([*config.centre_W, -0.25])
     plant.RegisterCollisionGeometry(plant.world_body(), X_WT, table, "table", TABLE_FRICTION)
     bodies = [plant.get_body(index) for index in add_scene(plant, placed).values()]
     plant.Finalize()
@@ -156,7 +166,7 @@ def settle(placed: Sequence[PlacedObject], config: SceneConfig) -> list[PlacedOb
         ):
             break
     return [
-        PlacedObject(item.name, item.model_path, body.EvalPoseInWorld(context), item.feet)
+        PlacedObject(item.model, body.EvalPoseInWorld(context))
         for item, body in zip(placed, bodies, strict=True)
     ]
 
@@ -190,7 +200,7 @@ def _lay_out(
     for model in models:
         touching = rng.uniform() < config.touch_probability
         low, high = (0.0, config.touch_gap) if touching else (config.gap_min, config.gap_max)
-        gap = rng.uniform(low, high)
+        gap = max(rng.uniform(low, high), CLEAR)
         if not prints:
             spots.append((rng.uniform(-np.pi, np.pi), np.zeros(2)))
             prints.append(model.footprint.moved(*spots[0]))
@@ -250,11 +260,9 @@ def _centred(
 
 def _stand(model: ObjectModel, yaw: float, p_xy: NDArray) -> PlacedObject:
     """A model turned by `yaw` about the vertical, its lowest point a little above the table."""
-    height = -model.footprint.bottom + DROP
-    X_WB = RigidTransform(
-        RotationMatrix.MakeZRotation(yaw).multiply(model.X_WB.rotation()), [p_xy[0], p_xy[1], height]
-    )
-    return PlacedObject(model.name, model.path, X_WB, model.feet)
+    R_WB = RotationMatrix.MakeZRotation(yaw).multiply(model.X_WB.rotation())
+    X_WB = RigidTransform(R_WB, [*p_xy, DROP - model.footprint.bottom])
+    return PlacedObject(model, X_WB)
 
 
 def _restless(placed: Sequence[PlacedObject], settled: Sequence[PlacedObject]) -> str:
@@ -270,9 +278,7 @@ def _restless(placed: Sequence[PlacedObject], settled: Sequence[PlacedObject]) -
     return ""
 
 
-def _foot_properties() -> ProximityProperties:
+def _foot_properties(friction: CoulombFriction) -> ProximityProperties:
     properties = ProximityProperties()
-    AddContactMaterial(
-        dissipation=2.0, point_stiffness=2e4, friction=CoulombFriction(0.7, 0.7), properties=properties
-    )
+    AddContactMaterial(dissipation=2.0, point_stiffness=2e4, friction=friction, properties=properties)
     return properties

@@ -1,0 +1,237 @@
+"""A station in simulation: the Panda, its wrist camera, a table and the objects on it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from pydrake.geometry import (
+    ClippingRange,
+    ColorRenderCamera,
+    DepthRange,
+    DepthRenderCamera,
+    IllustrationProperties,
+    LightParameter,
+    MakeRenderEngineVtk,
+    Meshcat,
+    MeshcatVisualizer,
+    PerceptionProperties,
+    RenderCameraCore,
+    RenderEngineVtkParams,
+    Rgba,
+    RoleAssign,
+    SceneGraph,
+)
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import (
+    AddMultibodyPlantSceneGraph,
+    ContactModel,
+    DiscreteContactApproximation,
+    MultibodyPlant,
+)
+from pydrake.multibody.tree import Frame, ModelInstanceIndex, PdControllerGains
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import Demultiplexer, StateInterpolatorWithDiscreteDerivative
+from pydrake.systems.sensors import CameraInfo, RgbdSensor
+
+from riseg_drake.robot.description import JOINT_NAMES, PandaDescription, add_panda, register_models
+from riseg_drake.robot.kinematics import PandaKinematics, observe_pose
+from riseg_drake.stations.scene import (
+    PlacedObject,
+    SceneConfig,
+    add_scene,
+    draw_scene,
+    object_id_table,
+)
+from riseg_drake.stations.wrist_camera import CameraConfig, ObjectLabels, WristCamera
+
+RENDERER = "renderer"
+CLIPPING = (0.01, 10.0)  # m; what the renderer draws, wider than what the sensor measures
+
+
+def soft_light() -> RenderEngineVtkParams:
+    """Two broad lights from above that leave a white table a little below white."""
+    lights = [
+        LightParameter(type="directional", frame="world", direction=direction, intensity=intensity)
+        for direction, intensity in (([-0.5, 0.4, -1.0], 0.5), ([0.6, -0.5, -1.0], 0.45))
+    ]
+    return RenderEngineVtkParams(lights=lights, default_clear_color=[0.6, 0.62, 0.65])
+
+
+@dataclass
+class TableConfig:
+    """The table and its looks."""
+
+    url: str = "package://riseg_drake_models/table/table.sdf"
+    """A model of one link, its origin in the middle of the top face."""
+    centre_W: list[float] = field(default_factory=lambda: [0.45, 0.0])
+    """Where its middle stands, x and y in W, m."""
+    color: list[float] = field(default_factory=list)
+    """Red, green, blue of the top, 0 to 1; empty: as the model says (white)."""
+    texture: str = ""
+    """A PNG or JPEG file laid over the top; empty: none."""
+
+
+@dataclass
+class SimulatedStationConfig:
+    """Everything that a simulated station can be told."""
+
+    panda: PandaDescription = field(default_factory=PandaDescription)
+    scene: SceneConfig = field(default_factory=SceneConfig)
+    camera: CameraConfig = field(default_factory=CameraConfig)
+    table: TableConfig = field(default_factory=TableConfig)
+    renderer: RenderEngineVtkParams = field(default_factory=soft_light)
+    """Lights, shadows and background of the camera's pictures."""
+    time_step: float = 0.002
+    """Longest step of the simulation, s; shortened so that a whole number of steps makes a picture."""
+    stiffness: float = 2000.0
+    """Proportional gain of every joint's controller, N m / rad."""
+    damping: float = 200.0
+    """Derivative gain of every joint's controller, N m s / rad."""
+    start_position: list[float] = field(default_factory=list)
+    """Joint angles at the start, rad, 7; empty: looking straight down at the middle of the work area."""
+    observe_height: float = 0.5
+    """Height of the camera above the table at the start, m; unused where start_position is given."""
+
+
+class SimulatedStation(Diagram):
+    """The ports of `contract.py`, and the ground truth as `cheat.*`.
+
+    Ground truth: `cheat.label_image` (ImageLabel16I, object ids 1..N, all else 0) shows the latest state
+    and is drawn only when pulled; `cheat.color_image` likewise, without noise; `cheat.body_poses`
+    (poses X_WB of all bodies of `plant`, by body index).
+
+    `objects` replaces the scene that `config.scene` would draw. Raises ValueError (SceneError for an
+    impossible scene) for settings that cannot be.
+    """
+
+    def __init__(
+        self,
+        config: SimulatedStationConfig,
+        seed: int = 0,
+        *,
+        objects: Sequence[PlacedObject] | None = None,
+        meshcat: Meshcat | None = None,
+    ):
+        super().__init__()
+        steps_a_picture = int(np.ceil(1 / (config.camera.rate * config.time_step) - 1e-9))
+        step = 1 / (config.camera.rate * steps_a_picture)
+        builder = DiagramBuilder()
+        plant, scene_graph = AddMultibodyPlantSceneGraph(builder, step)
+        # With these two, pushes of 2 cm end within a millimetre and things lie still (at 1 to 2 ms).
+        plant.set_contact_model(ContactModel.kPoint)
+        plant.set_discrete_contact_approximation(DiscreteContactApproximation.kLagged)
+        scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(config.renderer))
+        panda = add_panda(plant, config.panda)
+        for instance in (panda.arm, panda.pusher):
+            plant.set_gravity_enabled(instance, False)
+        _add_table(plant, scene_graph, config.table)
+        self.objects = list(objects or draw_scene(config.scene, np.random.default_rng(seed)))
+        """The scene as it was at the start; object id i + 1 is `objects[i]`."""
+        self.object_bodies = add_scene(plant, self.objects)
+        """Index of the body of each object id."""
+        _set_gains(plant, panda.arm, config)
+        plant.Finalize()
+        plant.SetDefaultPositions(panda.arm, start_position(config))
+        self.plant = plant
+        self.scene_graph = scene_graph
+
+        self._wire_arm(builder, panda.arm, step)
+        self._wire_camera(builder, panda.camera_frame, config.camera, seed, step)
+        builder.ExportOutput(plant.get_body_poses_output_port(), "cheat.body_poses")
+        if meshcat is not None:
+            MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
+        builder.BuildInto(self)
+        self.set_name("station")
+
+    def _wire_arm(self, builder: DiagramBuilder, arm: ModelInstanceIndex, step: float) -> None:
+        """Commands go in with their rate of change as desired velocity, so that the arm does not lag."""
+        reference = builder.AddNamedSystem("reference", StateInterpolatorWithDiscreteDerivative(7, step))
+        split = builder.AddNamedSystem("measured", Demultiplexer([7, 7]))
+        builder.Connect(reference.get_output_port(), self.plant.get_desired_state_input_port(arm))
+        builder.Connect(self.plant.get_state_output_port(arm), split.get_input_port())
+        builder.ExportInput(reference.get_input_port(), "panda.position")
+        builder.ExportOutput(split.get_output_port(0), "panda.position_measured")
+        builder.ExportOutput(split.get_output_port(1), "panda.velocity_measured")
+
+    def _wire_camera(
+        self, builder: DiagramBuilder, frame: Frame, config: CameraConfig, seed: int, step: float
+    ) -> None:
+        k = config
+        core = RenderCameraCore(
+            RENDERER,
+            CameraInfo(k.width, k.height, k.fx, k.fy, k.cx, k.cy),
+            ClippingRange(*CLIPPING),
+            RigidTransform(),
+        )
+        sensor = builder.AddNamedSystem(
+            "ideal_camera",
+            RgbdSensor(
+                self.plant.GetBodyFrameIdOrThrow(frame.body().index()),
+                frame.GetFixedPoseInBodyFrame(),
+                ColorRenderCamera(core),
+                DepthRenderCamera(core, DepthRange(*CLIPPING)),
+            ),
+        )
+        # A quarter of a step after the plant's own: joint angles read within the millisecond after that
+        # are those of the picture.
+        camera = builder.AddNamedSystem("wrist_camera", WristCamera(k, seed, 1 / k.rate, step / 4))
+        labels = builder.AddNamedSystem("labels", ObjectLabels(k, object_id_table(self.object_bodies)))
+        builder.Connect(self.scene_graph.get_query_output_port(), sensor.query_object_input_port())
+        builder.Connect(sensor.color_image_output_port(), camera.GetInputPort("color_image"))
+        builder.Connect(sensor.depth_image_32F_output_port(), camera.GetInputPort("depth_image"))
+        builder.Connect(sensor.label_image_output_port(), labels.get_input_port())
+        for name in ("color_image", "depth_image", "image_time"):
+            builder.ExportOutput(camera.GetOutputPort(name), f"wrist.{name}")
+        builder.ExportOutput(sensor.color_image_output_port(), "cheat.color_image")
+        builder.ExportOutput(labels.get_output_port(), "cheat.label_image")
+
+
+def start_position(config: SimulatedStationConfig) -> list[float]:
+    """Joint angles at the start, rad [7]. Raises ValueError where the arm cannot look from there."""
+    if config.start_position:
+        if len(config.start_position) != 7:
+            raise ValueError(f"start_position: {len(config.start_position)} angles; expected 7, in rad")
+        return config.start_position
+    kinematics = PandaKinematics(config.panda)
+    q = kinematics.solve_ik(
+        observe_pose([*config.scene.centre_W, 0.0], config.observe_height, kinematics.X_EC)
+    )
+    if q is None:
+        raise ValueError(
+            f"observe_height: no posture looks at {config.scene.centre_W} from {config.observe_height} "
+            "m; 0.5 m above (0.5, 0) is within reach"
+        )
+    return list(q)
+
+
+def _set_gains(plant: MultibodyPlant, arm: ModelInstanceIndex, config: SimulatedStationConfig) -> None:
+    for name in JOINT_NAMES:
+        joint = plant.GetJointByName(name, arm)
+        for index in plant.GetJointActuatorIndices():
+            actuator = plant.get_joint_actuator(index)
+            if actuator.joint().index() == joint.index():
+                actuator.set_controller_gains(PdControllerGains(p=config.stiffness, d=config.damping))
+
+
+def _add_table(plant: MultibodyPlant, scene_graph: SceneGraph, config: TableConfig) -> None:
+    parser = Parser(plant)
+    register_models(parser)
+    (table,) = parser.AddModels(url=config.url)
+    (body_index,) = plant.GetBodyIndices(table)
+    body = plant.get_body(body_index)
+    plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform([*config.centre_W, 0.0]))
+    if not config.color and not config.texture:
+        return
+    if config.texture and not Path(config.texture).is_file():
+        raise ValueError(f"table texture: no file {config.texture}; expected a PNG or JPEG image")
+    for geometry in plant.GetVisualGeometriesForBody(body):
+        for properties in (PerceptionProperties(), IllustrationProperties()):
+            properties.AddProperty("phong", "diffuse", Rgba(*(config.color or [1.0, 1.0, 1.0])))
+            if config.texture:
+                properties.AddProperty("phong", "diffuse_map", config.texture)
+            if isinstance(properties, PerceptionProperties):
+                old = scene_graph.model_inspector().GetPerceptionProperties(geometry)
+                properties.AddProperty("label", "id", old.GetProperty("label", "id"))
+            scene_graph.AssignRole(plant.get_source_id(), geometry, properties, RoleAssign.kReplace)

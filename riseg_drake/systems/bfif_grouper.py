@@ -1,0 +1,58 @@
+"""Lines 3 to 6 of Alg. 2 as a system: effective flow, body frames, twists, groups."""
+
+import numpy as np
+from pydrake.common.value import AbstractValue
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.segmentation.bfif import BFIFParameters, group_body_frames
+from riseg_drake.systems.stage_clock import timed
+
+
+class BFIFGrouper(LeafSystem):
+    """G_t: body frames on what moves, grouped by their spatial twists.
+
+    Body frames are drawn from a generator seeded by `seed` and the frame's number, so the same pair
+    gives the same groups.
+
+    Input ports:
+        pair (FramePair), expected_flow, optical_flow ([H, W, 2], pixels),
+        above_table (AboveTable at t-1).
+    Output ports:
+        groups (BFIFGroups), flow_span (1, pixels: effective flow of the fastest group; 0 if none).
+    """
+
+    def __init__(self, parameters: BFIFParameters | None = None, seed: int = 0) -> None:
+        super().__init__()
+        self.set_name("BFIFGrouper")
+        self._parameters, self._seed = parameters or BFIFParameters(), seed
+        self._pair, self._expected_flow, self._optical_flow, self._above = (
+            self.DeclareAbstractInputPort(name, AbstractValue.Make(object()))
+            for name in ("pair", "expected_flow", "optical_flow", "above_table")
+        )
+        self._groups = self.DeclareAbstractOutputPort(
+            "groups",
+            lambda: AbstractValue.Make(object()),
+            self._calc_groups,
+            prerequisites_of_calc={self.all_input_ports_ticket()},
+        )
+        self.DeclareVectorOutputPort(
+            "flow_span", 1, self._calc_flow_span, prerequisites_of_calc={self.all_input_ports_ticket()}
+        )
+
+    @timed
+    def _calc_groups(self, context: Context, output: AbstractValue) -> None:
+        pair: FramePair = self._pair.Eval(context)
+        output.set_value(
+            group_body_frames(
+                pair,
+                self._expected_flow.Eval(context),
+                self._optical_flow.Eval(context),
+                self._above.Eval(context),
+                self._parameters,
+                np.random.default_rng([self._seed, pair.current.sequence]),
+            )
+        )
+
+    def _calc_flow_span(self, context: Context, output: BasicVector) -> None:
+        output[0] = self._groups.Eval(context).flow_span

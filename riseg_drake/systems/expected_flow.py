@@ -1,0 +1,32 @@
+"""GetExpectedFlow (Alg. 2, line 1) as a system."""
+
+from pydrake.common.value import AbstractValue
+from pydrake.systems.framework import Context, LeafSystem
+
+from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.segmentation.expected_flow import expected_flow
+from riseg_drake.systems.stage_clock import timed
+
+
+class ExpectedFlow(LeafSystem):
+    """E_t from depth and forward kinematics.
+
+    Input port: pair (FramePair).
+    Output port: expected_flow ([H, W, 2] float32, pixels, NaN where depth is invalid).
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.set_name("ExpectedFlow")
+        self._pair = self.DeclareAbstractInputPort("pair", AbstractValue.Make(object()))
+        self.DeclareAbstractOutputPort(
+            "expected_flow",
+            lambda: AbstractValue.Make(object()),
+            self._calc_expected_flow,
+            prerequisites_of_calc={self.all_input_ports_ticket()},
+        )
+
+    @timed
+    def _calc_expected_flow(self, context: Context, output: AbstractValue) -> None:
+        pair: FramePair = self._pair.Eval(context)
+        output.set_value(expected_flow(pair.reference.depth, pair.X_C1C0, pair.current.intrinsics))

@@ -1,0 +1,86 @@
+"""The one memory of frames: (I_t-1, I_t, theta_t-1, theta_t) and what stands on the table in both."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from pydrake.common.value import AbstractValue
+from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
+
+from riseg_drake.geometry.rgbd import FramePair, Immutable
+from riseg_drake.segmentation.above_table import AboveTable
+from riseg_drake.segmentation.frame_pairs import FramePairParameters, next_pair
+
+
+@dataclass(frozen=True)
+class RememberedPair(Immutable):
+    """The pair, and objMask of its two frames."""
+
+    pair: FramePair
+    above_0: AboveTable
+    above_1: AboveTable
+
+
+class FramePairMemory(LeafSystem):
+    """Takes in a frame whenever its time is new, and pairs it with the right reference.
+
+    All stages read the same pair in the same tick: pairing happens here and nowhere else.
+
+    Input ports:
+        frame (Frame or None), above_table (AboveTable of that frame),
+        flow_span (1, pixels: effective flow found in the pair that is in memory).
+    Output ports, of the pair in memory (None before the first frame):
+        pair (FramePair), above_table_reference, above_table (AboveTable at t-1 and at t),
+        pair_time (1, s: the time of the frame at t; 0 before the first).
+    """
+
+    def __init__(self, period: float, offset: float, parameters: FramePairParameters | None = None) -> None:
+        """Look for a new frame every `period` s, `offset` s after the camera's tick."""
+        super().__init__()
+        self.set_name("FramePair")
+        self._parameters = parameters or FramePairParameters()
+        self._frame = self.DeclareAbstractInputPort("frame", AbstractValue.Make(object()))
+        self._above = self.DeclareAbstractInputPort("above_table", AbstractValue.Make(object()))
+        self._flow_span = self.DeclareVectorInputPort("flow_span", 1)
+        self._memory = self.DeclareAbstractState(AbstractValue.Make(None))
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, offset, self._take_frame)
+        for name, read in (
+            ("pair", lambda memory: memory.pair),
+            ("above_table_reference", lambda memory: memory.above_0),
+            ("above_table", lambda memory: memory.above_1),
+        ):
+            self._declare_output(name, read)
+        self.DeclareVectorOutputPort(
+            "pair_time", 1, self._calc_pair_time, prerequisites_of_calc={self.all_state_ticket()}
+        )
+
+    def _take_frame(self, context: Context, state: State) -> None:
+        frame = self._frame.Eval(context)
+        memory: RememberedPair | None = context.get_abstract_state(self._memory).get_value()
+        if frame is None or (memory is not None and frame.time <= memory.pair.current.time):
+            return
+        above = self._above.Eval(context)
+        if memory is None:
+            pair = next_pair(None, frame, 0.0, self._parameters)
+            above_0 = above
+        else:
+            flow_span = float(self._flow_span.Eval(context)[0])
+            frame = replace(frame, sequence=memory.pair.current.sequence + 1)
+            pair = next_pair(memory.pair, frame, flow_span, self._parameters)
+            above_0 = memory.above_0 if pair.reference is memory.pair.reference else memory.above_1
+        state.get_mutable_abstract_state(self._memory).set_value(RememberedPair(pair, above_0, above))
+
+    def _declare_output(self, name: str, read: Callable[[RememberedPair], object]) -> None:
+        def calc(context: Context, output: AbstractValue) -> None:
+            memory = context.get_abstract_state(self._memory).get_value()
+            output.set_value(None if memory is None else read(memory))
+
+        self.DeclareAbstractOutputPort(
+            name,
+            lambda: AbstractValue.Make(object()),
+            calc,
+            prerequisites_of_calc={self.all_state_ticket()},
+        )
+
+    def _calc_pair_time(self, context: Context, output: BasicVector) -> None:
+        memory = context.get_abstract_state(self._memory).get_value()
+        output[0] = 0.0 if memory is None else memory.pair.current.time

@@ -1,0 +1,72 @@
+"""From the station's ports to one Frame: I_t with the kinematics that belong to it."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.value import AbstractValue
+from pydrake.systems.framework import Context, LeafSystem
+from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
+
+from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.geometry.rgbd import Frame, sanitize_depth
+from riseg_drake.systems.stage_clock import timed
+
+
+class FrameView(LeafSystem):
+    """Colour, depth, time and theta_t of one moment, put together.
+
+    Input ports:
+        color_image (ImageRgba8U), depth_image (ImageDepth32F, m, aligned to colour),
+        image_time (1, s), position (joint angles theta_t, rad).
+    Output port:
+        frame (Frame, `sequence` 0: who stores frames counts them), None while there is no image.
+    """
+
+    def __init__(
+        self,
+        intrinsics: Intrinsics,
+        X_WC: Callable[[NDArray], NDArray],
+        robot_mask: Callable[[NDArray], NDArray],
+        num_positions: int = 7,
+    ) -> None:
+        """`X_WC` and `robot_mask` give the camera's pose and the robot's own pixels at theta."""
+        super().__init__()
+        self.set_name("FrameView")
+        self._intrinsics, self._X_WC, self._robot_mask = intrinsics, X_WC, robot_mask
+        self._color = self.DeclareAbstractInputPort("color_image", AbstractValue.Make(ImageRgba8U()))
+        self._depth = self.DeclareAbstractInputPort("depth_image", AbstractValue.Make(ImageDepth32F()))
+        self._time = self.DeclareVectorInputPort("image_time", 1)
+        self._position = self.DeclareVectorInputPort("position", num_positions)
+        self.DeclareAbstractOutputPort(
+            "frame",
+            lambda: AbstractValue.Make(object()),
+            self._calc_frame,
+            prerequisites_of_calc={self.all_input_ports_ticket()},
+        )
+
+    @timed
+    def _calc_frame(self, context: Context, output: AbstractValue) -> None:
+        color, depth = self._color.Eval(context), self._depth.Eval(context)
+        if color.width() == 0 or depth.width() == 0:  # no message has come yet
+            output.set_value(None)
+            return
+        if (color.height(), color.width()) != self._intrinsics.shape or depth.size() != color.width() * (
+            color.height()
+        ):
+            raise ValueError(
+                f"images of {color.width()}x{color.height()} (colour) and {depth.width()}x{depth.height()} "
+                f"(depth), but the intrinsics are for {self._intrinsics.width}x{self._intrinsics.height}"
+            )
+        q = self._position.Eval(context)
+        output.set_value(
+            Frame(
+                sequence=0,
+                time=float(self._time.Eval(context)[0]),
+                intrinsics=self._intrinsics,
+                color=np.ascontiguousarray(color.data[..., :3]),
+                depth=sanitize_depth(depth.data[..., 0]),
+                X_WC=self._X_WC(q),
+                robot=self._robot_mask(q),
+            )
+        )

@@ -1,0 +1,76 @@
+"""Segment (Alg. 2, line 7) as a system, and the one place where L_t-1 is kept."""
+
+from pydrake.common.value import AbstractValue
+from pydrake.systems.framework import Context, LeafSystem, State
+
+from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.segmentation.segment import Segmentation, SegmentParameters, nothing_segmented, segment
+from riseg_drake.systems.stage_clock import timed
+
+
+class MaskPropagator(LeafSystem):
+    """L_t from G_t, O_t and L_t-1, once for each new frame.
+
+    Input ports:
+        pair (FramePair or None), expected_flow, optical_flow ([H, W, 2], pixels), groups (BFIFGroups),
+        above_table_reference, above_table (AboveTable at t-1 and at t).
+    Output ports, as of the last update:
+        mask ([H, W] uint16, L_t, 0 = background), segmentation (Segmentation: the ids, also of objects
+        out of sight, and where they are remembered).
+    """
+
+    def __init__(
+        self,
+        intrinsics: Intrinsics,
+        period: float,
+        offset: float,
+        parameters: SegmentParameters | None = None,
+    ) -> None:
+        """Update every `period` s, `offset` s after the camera's tick and after the frame pair's."""
+        super().__init__()
+        self.set_name("MaskPropagator")
+        self._parameters = parameters or SegmentParameters()
+        self._pair, *self._stages = (
+            self.DeclareAbstractInputPort(name, AbstractValue.Make(object()))
+            for name in (
+                "pair",
+                "expected_flow",
+                "optical_flow",
+                "groups",
+                "above_table_reference",
+                "above_table",
+            )
+        )
+        self._state = self.DeclareAbstractState(AbstractValue.Make(nothing_segmented(intrinsics.shape)))
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, offset, self._update)
+        self.DeclareAbstractOutputPort(
+            "mask",
+            lambda: AbstractValue.Make(object()),
+            lambda context, output: output.set_value(self._segmentation(context).mask),
+            prerequisites_of_calc={self.all_state_ticket()},
+        )
+        self.DeclareAbstractOutputPort(
+            "segmentation",
+            lambda: AbstractValue.Make(object()),
+            lambda context, output: output.set_value(self._segmentation(context)),
+            prerequisites_of_calc={self.all_state_ticket()},
+        )
+
+    def _segmentation(self, context: Context) -> Segmentation:
+        return context.get_abstract_state(self._state).get_value()
+
+    def _update(self, context: Context, state: State) -> None:
+        pair: FramePair | None = self._pair.Eval(context)
+        if pair is None or pair.current.sequence == self._segmentation(context).sequence:
+            return
+        self._segment(context, state, pair)
+
+    @timed
+    def _segment(self, context: Context, state: State, pair: FramePair) -> None:
+        expected_flow, optical_flow, groups, above_0, above_1 = (s.Eval(context) for s in self._stages)
+        before = self._segmentation(context)
+        following = segment(
+            before, pair, expected_flow, optical_flow, groups, above_0, above_1, self._parameters
+        )
+        state.get_mutable_abstract_state(self._state).set_value(following)

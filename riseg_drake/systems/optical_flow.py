@@ -1,0 +1,33 @@
+"""OpticalFlow (Alg. 2, line 2) as a system, around any flow method."""
+
+from pydrake.common.value import AbstractValue
+from pydrake.systems.framework import Context, LeafSystem
+
+from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.segmentation.optical_flow import DisFlow, FlowMethod
+from riseg_drake.systems.stage_clock import timed
+
+
+class OpticalFlow(LeafSystem):
+    """O_t by any method that follows the `FlowMethod` protocol; DIS by default.
+
+    Input port: pair (FramePair).
+    Output port: optical_flow ([H, W, 2] float32, pixels).
+    """
+
+    def __init__(self, method: FlowMethod | None = None) -> None:
+        super().__init__()
+        self.set_name("OpticalFlow")
+        self._method = method or DisFlow()
+        self._pair = self.DeclareAbstractInputPort("pair", AbstractValue.Make(object()))
+        self.DeclareAbstractOutputPort(
+            "optical_flow",
+            lambda: AbstractValue.Make(object()),
+            self._calc_optical_flow,
+            prerequisites_of_calc={self.all_input_ports_ticket()},
+        )
+
+    @timed
+    def _calc_optical_flow(self, context: Context, output: AbstractValue) -> None:
+        pair: FramePair = self._pair.Eval(context)
+        output.set_value(self._method(pair.reference.color, pair.current.color))

@@ -1,0 +1,250 @@
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydrake.geometry import (
+    ClippingRange,
+    ColorRenderCamera,
+    DepthRange,
+    DepthRenderCamera,
+    MakeRenderEngineVtk,
+    RenderCameraCore,
+    RenderEngineVtkParams,
+)
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.sensors import CameraInfo, RgbdSensor
+
+from riseg_drake.stations.footprint import Footprint, separation, travel
+from riseg_drake.stations.object_models import find_models
+from riseg_drake.stations.scene import (
+    PlacedObject,
+    SceneConfig,
+    SceneError,
+    add_scene,
+    draw_scene,
+    object_id_table,
+)
+
+SEEDS = range(6)
+INERTIAL = (
+    "<inertial><mass>0.1</mass><inertia><ixx>6e-5</ixx><iyy>6e-5</iyy><izz>7e-5</izz></inertia></inertial>"
+)
+
+
+def sdf(geometry: str, pose: str = "0 0 0 0 0 0", more: str = "") -> str:
+    collision = f'<collision name="c"><geometry>{geometry}</geometry></collision>' if geometry else ""
+    return (
+        f'<sdf version="1.9"><model name="m"><pose>{pose}</pose>'
+        f'<link name="b">{INERTIAL}{collision}</link>{more}</model></sdf>'
+    )
+
+
+def box(x: float, y: float, z: float) -> str:
+    return f"<box><size>{x} {y} {z}</size></box>"
+
+
+def write_plain_models(folder: Path) -> None:
+    (folder / "brick.sdf").write_text(sdf(box(0.08, 0.05, 0.04)))
+    (folder / "slab.sdf").write_text(sdf(box(0.09, 0.04, 0.015)))
+    (folder / "lying.sdf").write_text(sdf(box(0.04, 0.05, 0.08), pose="0 0 0.3 1.5707963 0 0"))
+    (folder / "can").mkdir()
+    (folder / "can" / "model.sdf").write_text(
+        sdf("<cylinder><radius>0.03</radius><length>0.05</length></cylinder>")
+    )
+    (folder / "dice.urdf").write_text(
+        '<robot name="dice"><link name="d"><inertial><mass value="0.1"/>'
+        '<inertia ixx="6e-5" iyy="6e-5" izz="7e-5" ixy="0" ixz="0" iyz="0"/></inertial>'
+        '<collision><geometry><box size="0.05 0.05 0.05"/></geometry></collision></link></robot>'
+    )
+
+
+def draw(seed: int, **options) -> list[PlacedObject]:
+    return draw_scene(SceneConfig(**options), np.random.default_rng(seed))
+
+
+def lying(item: PlacedObject) -> Footprint:
+    """An object's footprint where it came to rest."""
+    R = item.X_WB.rotation().multiply(item.model.X_WB.rotation().inverse()).matrix()
+    return item.model.footprint.moved(np.arctan2(R[1, 0], R[0, 0]), item.X_WB.translation()[:2])
+
+
+def distances(scene: list[PlacedObject]) -> list[float]:
+    return [separation(a, b) for a, b in itertools.combinations(map(lying, scene), 2)]
+
+
+@pytest.fixture(scope="module")
+def scenes() -> list[list[PlacedObject]]:
+    return [draw(seed) for seed in SEEDS]
+
+
+def test_a_shape_travels_until_its_corner_meets_an_edge():
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])
+    left = Footprint((square,), 0.0)
+    right = left.moved(0.0, np.array([3.0, 0.5]))
+    assert travel(left, right, np.array([1.0, 0.0])) == pytest.approx(2.0)
+    assert travel(right, left, np.array([-1.0, 0.0])) == pytest.approx(2.0)
+    assert travel(left, right, np.array([0.0, 1.0])) == np.inf
+    assert separation(left, right) == pytest.approx(2.0)
+    assert separation(left, left.moved(0.0, np.array([1.3, 1.4]))) == pytest.approx(0.5)
+    assert separation(left, left.moved(0.0, np.array([0.9, 0.9]))) == 0.0
+
+
+@pytest.mark.renders
+def test_a_scene_has_four_to_six_different_objects(scenes):
+    counts = [len(scene) for scene in scenes]
+    assert min(counts) >= 4
+    assert max(counts) <= 6
+    assert len(set(counts)) > 1
+    assert all(len({item.name for item in scene}) == len(scene) for scene in scenes)
+
+
+@pytest.mark.renders
+def test_nothing_overlaps_and_in_every_scene_something_touches(scenes):
+    for scene in scenes:
+        gaps = distances(scene)
+        assert min(gaps) > 0
+        assert sum(gap < 0.003 for gap in gaps) >= 1
+    assert np.mean([sum(gap < 0.003 for gap in distances(scene)) for scene in scenes]) >= 2
+
+
+@pytest.mark.renders
+def test_every_object_lies_inside_the_work_area(scenes):
+    for item in itertools.chain(*scenes):
+        assert np.linalg.norm(lying(item).corners() - (0.5, 0.0), axis=1).max() < 0.15
+
+
+@pytest.mark.renders
+def test_every_object_stands_level_on_the_table(scenes):
+    for item in itertools.chain(*scenes):
+        assert item.X_WB.rotation().matrix()[2, 2] > np.cos(np.radians(0.1))
+        assert item.X_WB.translation()[2] == pytest.approx(-item.model.footprint.bottom, abs=1e-4)
+
+
+@pytest.mark.renders
+def test_the_same_seed_gives_the_same_scene_to_the_last_bit(scenes):
+    again = draw(SEEDS[1])
+    assert [item.name for item in again] == [item.name for item in scenes[1]]
+    for item, before in zip(again, scenes[1], strict=True):
+        assert np.array_equal(item.X_WB.GetAsMatrix4(), before.X_WB.GetAsMatrix4())
+
+
+@pytest.mark.renders
+def test_different_seeds_give_different_scenes(scenes):
+    assert len({tuple(item.name for item in scene) for scene in scenes}) == len(scenes)
+
+
+def test_objects_can_be_chosen_by_name():
+    scene = draw(0, names=["zebra", "cookie"], count_min=2, count_max=2)
+    assert sorted(item.name for item in scene) == ["cookie", "zebra"]
+
+
+def test_a_folder_of_plain_models_makes_a_scene(tmp_path):
+    write_plain_models(tmp_path)
+    scene = draw(3, objects=str(tmp_path), count_min=5, count_max=5)
+    assert {item.name for item in scene} == {"brick", "can", "dice", "lying", "slab"}
+    assert min(distances(scene)) > 0
+    height = {item.name: item.X_WB.translation()[2] for item in scene}
+    for name, half in {
+        "brick": 0.02,
+        "slab": 0.0075,
+        "lying": 0.025,
+        "can": 0.025,
+        "dice": 0.025,
+    }.items():
+        # On its added feet a box stands 0.3 mm high; without them it sinks into the table.
+        assert height[name] == pytest.approx(half, abs=5e-4)
+
+
+def test_object_ids_count_the_bodies_in_the_order_of_the_scene():
+    scene = draw(0, names=["fish", "pizza", "starfish"], count_min=3, count_max=3)
+    plant = MultibodyPlant(0.002)
+    bodies = add_scene(plant, scene)
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    assert list(bodies) == [1, 2, 3]
+    for item, body in zip(scene, bodies.values(), strict=True):
+        assert plant.get_body(body).name() == item.name
+        assert plant.get_body(body).EvalPoseInWorld(context).IsNearlyEqualTo(item.X_WB, 1e-12)
+    table = object_id_table(bodies)
+    assert [table[int(body)] for body in bodies.values()] == [1, 2, 3]
+    assert table.sum() == 6
+
+
+@pytest.mark.renders
+def test_every_object_shows_in_the_label_image_of_a_camera_half_a_metre_up(scenes):
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.002)
+    scene_graph.AddRenderer("vtk", MakeRenderEngineVtk(RenderEngineVtkParams()))
+    bodies = add_scene(plant, scenes[0])
+    plant.Finalize()
+    core = RenderCameraCore(
+        "vtk",
+        CameraInfo(640, 480, 616.0, 616.0, 319.5, 239.5),
+        ClippingRange(0.01, 5.0),
+        RigidTransform(),
+    )
+    X_WC = RigidTransform(RotationMatrix.MakeXRotation(np.pi), [0.5, 0.0, 0.5])
+    sensor = builder.AddSystem(
+        RgbdSensor(
+            scene_graph.world_frame_id(),
+            X_WC,
+            ColorRenderCamera(core),
+            DepthRenderCamera(core, DepthRange(0.1, 3.0)),
+        )
+    )
+    builder.Connect(scene_graph.get_query_output_port(), sensor.query_object_input_port())
+    diagram = builder.Build()
+    context = sensor.GetMyContextFromRoot(diagram.CreateDefaultContext())
+    image = object_id_table(bodies)[sensor.label_image_output_port().Eval(context).data[..., 0]]
+    assert set(np.unique(image)) == {0, *bodies}
+    border = np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
+    assert not border.any()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"count_min": 5, "count_max": 4}, "1 <= min <= max"),
+        ({"count_min": 40, "count_max": 50}, "40 different objects wanted"),
+        ({"radius": 0.07}, "do not fit within 0.07 m"),
+        ({"radius": -1.0}, "radius"),
+        ({"names": ["unicorn"]}, "no model unicorn"),
+        ({"touch_probability": 2.0}, "0 to 1"),
+        ({"objects": "no/such/folder"}, "not a folder"),
+        ({"objects": "package://nobody/objects"}, "nobody"),
+    ],
+)
+def test_an_impossible_scene_says_in_one_line_what_is_wrong(options, message):
+    with pytest.raises(SceneError, match=message) as error:
+        draw(0, **options)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (None, "no models in"),
+        (sdf(box(0.05, 0.05, 0.05), more=f'<link name="second">{INERTIAL}</link>'), "2 bodies"),
+        (sdf(""), "no collision geometry"),
+        (sdf(box(0.05, 0.05, 0.05), more="<static>true</static>"), "fixed to the world"),
+        (sdf("<plane><normal>0 0 1</normal></plane>"), "half space"),
+        ("<sdf version='1.9'><model", "cannot be read"),
+    ],
+)
+def test_a_model_that_cannot_be_used_is_named(tmp_path, text, message):
+    if text is not None:
+        (tmp_path / "thing.sdf").write_text(text)
+    with pytest.raises(SceneError, match=message) as error:
+        find_models(str(tmp_path))
+    assert "\n" not in str(error.value)
+    assert str(tmp_path) in str(error.value)
+
+
+def test_a_model_that_falls_over_is_named(tmp_path):
+    tower = sdf("<cylinder><radius>0.02</radius><length>0.06</length></cylinder>", pose="0 0 0 0.9 0 0")
+    (tmp_path / "tower.sdf").write_text(tower)
+    with pytest.raises(SceneError, match="tower does not stay where it is put"):
+        draw(0, objects=str(tmp_path), count_min=1, count_max=1)
