@@ -81,9 +81,7 @@ def split_at_necks(mask: NDArray[np.bool_], table: TableMap, neck: float) -> lis
     if amount <= 1:
         return [mask] if mask.any() else []
     # Every cell to the nearest core: distanceTransform numbers the cells of cores, not the cores.
-    _, nearest = cv2.distanceTransformWithLabels(
-        1 - cores, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-    )
+    _, nearest = cv2.distanceTransformWithLabels(1 - cores, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
     piece_of_label = np.zeros(nearest.max() + 1, int)
     piece_of_label[nearest[cores > 0]] = core_of[cores > 0]
     piece = np.where(mask, piece_of_label[nearest], 0)

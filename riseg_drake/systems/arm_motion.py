@@ -183,9 +183,7 @@ class ArmMotion(LeafSystem):
         assert memory.push.path is not None
         if time < memory.start_time + memory.push.path.duration:
             return memory
-        return replace(
-            memory, interaction_step=memory.interaction_step + 1, unjudged=memory.push, push=None
-        )
+        return replace(memory, interaction_step=memory.interaction_step + 1, unjudged=memory.push, push=None)
 
     def _judge(self, memory: _Memory, pair: FramePair, context: Context) -> _Memory:
         """Remember what the last push brought."""

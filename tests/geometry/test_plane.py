@@ -33,9 +33,7 @@ def with_noise(depth: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def angle_between(plane_a: np.ndarray, plane_b: np.ndarray) -> float:
-    return float(
-        np.arctan2(np.linalg.norm(np.cross(plane_a[:3], plane_b[:3])), plane_a[:3] @ plane_b[:3])
-    )
+    return float(np.arctan2(np.linalg.norm(np.cross(plane_a[:3], plane_b[:3])), plane_a[:3] @ plane_b[:3]))
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.3, 0.8])

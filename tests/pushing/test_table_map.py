@@ -56,7 +56,5 @@ def test_cells_are_no_finer_than_the_pixels(view):
 def test_ground_follows_a_sloped_table(view):
     seen = view([])
     slope = np.array([-0.1, 0.0, 1.0, -0.02]) / np.hypot(1, 0.1)
-    table = map_table(
-        seen.depth, seen.intrinsics, seen.X_WC, seen.objects, seen.height, seen.number, slope
-    )
+    table = map_table(seen.depth, seen.intrinsics, seen.X_WC, seen.objects, seen.height, seen.number, slope)
     assert table.ground(np.array([0.5, 0.3])) == pytest.approx(0.07)

@@ -23,9 +23,7 @@ def box(drawn):
 
 
 def criteria(validity):
-    return [
-        bool(c[0]) for c in (validity.center_on_object, validity.accessible, validity.moves_alone)
-    ]
+    return [bool(c[0]) for c in (validity.center_on_object, validity.accessible, validity.moves_alone)]
 
 
 def test_push_of_a_lone_box_is_valid(drawn, box):
@@ -73,7 +71,5 @@ def test_overlap_counts_other_objects_only(drawn, box):
 def test_area_the_end_effector_needs_turns_with_the_push(drawn, box):
     drawn.box(0.455, 0.012, 0.01, 0.01)
     b_W, direction_W = np.array([[0.5, -0.02]]), np.array([[0.0, 1.0]])
-    validity = is_valid_push(
-        b_W, direction_W, CENTER, box, drawn.map(), Pusher(), ValidityParameters()
-    )
+    validity = is_valid_push(b_W, direction_W, CENTER, box, drawn.map(), Pusher(), ValidityParameters())
     assert validity.valid.all()
