@@ -65,10 +65,14 @@ def noisy_depth(
         valid &= ~occlusion_shadow(depth, noise)
     if noise.edge_dropout > 0:
         valid &= ~(_edges(depth, noise.edge_step) & _drawn(noise.edge_dropout, depth.shape, rng))
-    noisy = depth + depth_std(depth, noise) * _correlated_normal(depth.shape, noise.correlation, rng)
+    noisy = _correlated_normal(depth.shape, noise.correlation, rng)
+    noisy *= depth_std(depth, noise)
+    noisy += depth
     if noise.quantum > 0:
-        noisy = np.rint(noisy * np.float32(1 / noise.quantum)) * np.float32(noise.quantum)
-    return np.where(valid, noisy, np.float32(0))
+        np.rint(np.multiply(noisy, np.float32(1 / noise.quantum), out=noisy), out=noisy)
+        noisy *= np.float32(noise.quantum)
+    noisy[~valid] = 0
+    return noisy
 
 
 def occlusion_shadow(depth: NDArray[np.float32], noise: SensorNoise) -> NDArray[np.bool_]:
@@ -79,13 +83,14 @@ def occlusion_shadow(depth: NDArray[np.float32], noise: SensorNoise) -> NDArray[
     """
     invalid = depth == 0
     with np.errstate(divide="ignore"):
-        disparity = np.float32(noise.focal_length * noise.baseline) / depth
-    landing = np.arange(depth.shape[1], dtype=np.float32) - disparity
+        landing = np.float32(-noise.focal_length * noise.baseline) / depth
+    landing += np.arange(depth.shape[1], dtype=np.float32)
     landing[invalid] = np.inf
     leftmost_from_here_on = np.minimum.accumulate(landing[:, ::-1], axis=1)[:, ::-1]
     shadow = np.zeros(depth.shape, bool)
-    shadow[:, :-1] = landing[:, :-1] >= leftmost_from_here_on[:, 1:]
-    return shadow & ~invalid
+    np.greater_equal(landing[:, :-1], leftmost_from_here_on[:, 1:], out=shadow[:, :-1])
+    shadow[invalid] = False
+    return shadow
 
 
 def _edges(depth: NDArray[np.float32], step: float) -> NDArray[np.bool_]:
@@ -101,8 +106,9 @@ def _correlated_normal(shape: tuple[int, ...], width: float, rng: np.random.Gene
         return white
     size = 2 * int(np.ceil(3 * width)) + 1
     kernel = cv2.getGaussianKernel(size, width)
-    # Blurring with weights k (x) k leaves the standard deviation sum k^2.
-    return np.multiply(cv2.GaussianBlur(white, (size, size), width), 1 / np.sum(kernel**2), dtype=np.float32)
+    blurred = np.asarray(cv2.GaussianBlur(white, (size, size), width), np.float32)
+    blurred /= np.float32(np.sum(kernel**2))  # the standard deviation that weights k (x) k leave
+    return blurred
 
 
 def _drawn(share: float, shape: tuple[int, ...], rng: np.random.Generator) -> NDArray[np.bool_]:
