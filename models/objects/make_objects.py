@@ -40,9 +40,7 @@ def make_toy(toy: Toy, folder: Path) -> None:
     loops = trace(toy.drawing)
     mesh = solid(loops, toy.profile, rng)
     volume, centre, inertia = mass_properties(mesh.vertices, mesh.faces)
-    shift = np.array(
-        [*centre[:2], 0.0]
-    )  # the origin of the body: under its centre of mass, on the table
+    shift = np.array([*centre[:2], 0.0])  # the origin of the body: under its centre of mass, on the table
     texture, chart = _texture(mesh, toy.pattern, rng)
     _write_png(folder / f"{toy.name}.png", texture)
     (folder / f"{toy.name}.mtl").write_text(_material(toy.name))
@@ -51,9 +49,7 @@ def make_toy(toy: Toy, folder: Path) -> None:
     for k, (vertices, faces) in enumerate(pieces):
         (folder / f"{toy.name}_piece_{k}.obj").write_text(_plain_obj(vertices - shift, faces))
     body = Body(toy.density * volume * MM**3, (centre - shift) * MM, toy.density * inertia * MM**5)
-    (folder / f"{toy.name}.sdf").write_text(
-        _sdf(toy, body, feet(loops, toy.profile) - shift, len(pieces))
-    )
+    (folder / f"{toy.name}.sdf").write_text(_sdf(toy, body, feet(loops, toy.profile) - shift, len(pieces)))
 
 
 def _texture(mesh: Mesh, pattern: Pattern, rng: np.random.Generator) -> tuple[NDArray, NDArray]:
@@ -72,9 +68,7 @@ def _write_png(path: Path, image: NDArray) -> None:
 
 
 def _material(name: str) -> str:
-    return (
-        f"newmtl {name}\nKa 1 1 1\nKd 1 1 1\nKs 0.05 0.05 0.05\nNs 10\nd 1\nillum 2\nmap_Kd {name}.png\n"
-    )
+    return f"newmtl {name}\nKa 1 1 1\nKd 1 1 1\nKs 0.05 0.05 0.05\nNs 10\nd 1\nillum 2\nmap_Kd {name}.png\n"
 
 
 def _textured_obj(name: str, mesh: Mesh, vertices: NDArray, chart: NDArray) -> str:

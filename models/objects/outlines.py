@@ -59,9 +59,7 @@ def polygon(corners: Sequence[tuple[float, float]], rounding: float = 0.0) -> Fi
 def arc(x: float, y: float, radius: float, begin: float, end: float, widths: Sequence[float]) -> Field:
     """A stroke along a circular arc from `begin` to `end` degrees, its half widths spread evenly."""
     angles = np.radians(np.linspace(begin, end, len(widths)))
-    nodes = [
-        (x + radius * np.cos(t), y + radius * np.sin(t), w) for t, w in zip(angles, widths, strict=True)
-    ]
+    nodes = [(x + radius * np.cos(t), y + radius * np.sin(t), w) for t, w in zip(angles, widths, strict=True)]
     return stroke(*nodes)
 
 
@@ -96,19 +94,13 @@ def inward_distance(points: NDArray, loops: Sequence[NDArray]) -> tuple[NDArray,
     return signed.reshape(points.shape[:-1]), nearest.reshape(points.shape)
 
 
-def trace(
-    field: Field, softening: float = 1.2, spacing: float = 2.8, reach: float = 75.0
-) -> list[NDArray]:
+def trace(field: Field, softening: float = 1.2, spacing: float = 2.8, reach: float = 75.0) -> list[NDArray]:
     """The closed curves [n, 2] around a drawing, its corners softened, a point every `spacing` mm."""
     axis = np.arange(-reach, reach, RASTER)
     distance = field(np.stack(np.meshgrid(axis, axis), axis=-1))
     soft = cv2.GaussianBlur(distance, (0, 0), softening / RASTER)
-    contours, hierarchy = cv2.findContours(
-        (soft < 0).astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE
-    )
-    outer = max(
-        (i for i in range(len(contours)) if hierarchy[0, i, 3] < 0), key=lambda i: len(contours[i])
-    )
+    contours, hierarchy = cv2.findContours((soft < 0).astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    outer = max((i for i in range(len(contours)) if hierarchy[0, i, 3] < 0), key=lambda i: len(contours[i]))
     holes = [i for i in range(len(contours)) if hierarchy[0, i, 3] == outer and len(contours[i]) > 40]
     loops = []
     for i in [outer, *holes]:

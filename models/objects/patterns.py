@@ -44,16 +44,12 @@ def cells(size: float, joint: float, names: Sequence[str], joint_name: str) -> P
         seeds = _scatter(points, size, 0.38, rng)
         distance, nearest = cKDTree(seeds).query(points, k=2)
         colour = paint(names, rng.integers(0, len(names), len(seeds))[nearest[..., 0]])
-        return np.where(
-            (distance[..., 1] - distance[..., 0] < joint)[..., None], PALETTE[joint_name], colour
-        )
+        return np.where((distance[..., 1] - distance[..., 0] < joint)[..., None], PALETTE[joint_name], colour)
 
     return pattern
 
 
-def spots(
-    base: Pattern, pitch: float, radius: float, names: Sequence[str], ring: str | None = None
-) -> Pattern:
+def spots(base: Pattern, pitch: float, radius: float, names: Sequence[str], ring: str | None = None) -> Pattern:
     """Round spots over a base pattern; `ring` gives each a broken ring: a leopard's rosettes."""
 
     def pattern(points: NDArray, rng: np.random.Generator) -> NDArray:
@@ -115,9 +111,7 @@ def scales(size: float, names: Sequence[str], joint_name: str) -> Pattern:
     return pattern
 
 
-def sprinkles(
-    base: Pattern, pitch: float, length: float, thickness: float, names: Sequence[str]
-) -> Pattern:
+def sprinkles(base: Pattern, pitch: float, length: float, thickness: float, names: Sequence[str]) -> Pattern:
     """Short rods strewn over a base pattern."""
 
     def pattern(points: NDArray, rng: np.random.Generator) -> NDArray:
@@ -138,9 +132,7 @@ def sprinkles(
     return pattern
 
 
-def wedges(
-    number: int, base: Sequence[str], spoke: str, radii: Sequence[float], rim: Sequence[str]
-) -> Pattern:
+def wedges(number: int, base: Sequence[str], spoke: str, radii: Sequence[float], rim: Sequence[str]) -> Pattern:
     """A cut citrus: `number` wedges with spokes between them, then a band of rim beyond each radius."""
 
     def pattern(points: NDArray, rng: np.random.Generator) -> NDArray:
@@ -188,9 +180,7 @@ def _scatter(points: NDArray, pitch: float, jitter: float, rng: np.random.Genera
     rows = int((high[1] - low[1]) / (0.866 * pitch)) + 1
     columns = int((high[0] - low[0]) / pitch) + 1
     row, column = np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")
-    lattice = np.stack(
-        [low[0] + pitch * (column + 0.5 * (row % 2)), low[1] + 0.866 * pitch * row], axis=-1
-    )
+    lattice = np.stack([low[0] + pitch * (column + 0.5 * (row % 2)), low[1] + 0.866 * pitch * row], axis=-1)
     return lattice.reshape(-1, 2) + rng.uniform(-jitter, jitter, (rows * columns, 2)) * pitch
 
 

@@ -57,7 +57,7 @@ TOYS = [
             0.10,
             6.0,
         ),
-        400,
+        600,
     ),
     Toy(
         "banana",
@@ -69,22 +69,20 @@ TOYS = [
                 spots(spots(plain("yellow"), 9, 3.0, ["brown", "orange"]), 4.5, 1.0, ["brown"]),
             )
         ),
-        600,
+        800,
     ),
     Toy(
         "cheese",
         polygon([(-36, -24), (38, -6), (38, 8), (-36, 26)], 4),
         Profile(28, 24, 3, 3, 3),
         plain("yellow"),
-        500,
+        700,
     ),
     Toy(
         "cookie",
         disc(0, 0, 35),
         Profile(15, 9, 3, 10, 3),
-        grained(
-            spots(spots(plain("orange"), 9, 3.0, ["brown", "black"]), 5, 1.1, ["yellow", "cream"]), 0.15
-        ),
+        grained(spots(spots(plain("orange"), 9, 3.0, ["brown", "black"]), 5, 1.1, ["yellow", "cream"]), 0.15),
         850,
         0.75,
     ),
@@ -93,7 +91,7 @@ TOYS = [
         arc(0, -12, 33, -35, 215, [6, 11, 15, 17.5, 18.5, 17.5, 15, 11, 6]),
         Profile(32, 12, 5, 15, 6),
         grained(wedges(26, ["yellow", "orange", "cream", "brown"], "brown", [], []), 0.18),
-        350,
+        500,
         0.75,
     ),
     Toy(
@@ -111,7 +109,7 @@ TOYS = [
                 stripes(3.0, ["brown", "orange"], 30, 3.0),
             )
         ),
-        450,
+        700,
     ),
     Toy(
         "elephant",
@@ -124,7 +122,7 @@ TOYS = [
         ),
         Profile(38, 14, 4, 11, 3),
         grained(cells(10, 1.3, ["teal", "pink", "yellow", "red", "cream"], "black"), 0.15),
-        450,
+        600,
     ),
     Toy(
         "fish",
@@ -140,7 +138,7 @@ TOYS = [
                 scales(8.0, ["teal", "orange", "yellow", "cream"], "black"),
             )
         ),
-        600,
+        800,
     ),
     Toy(
         "giraffe",
@@ -153,7 +151,7 @@ TOYS = [
         ),
         Profile(22, 11, 3, 6, 2.5),
         grained(cells(11, 2.0, ["brown", "orange", "brown"], "cream"), 0.15),
-        700,
+        800,
     ),
     Toy(
         "ladybird",
@@ -173,7 +171,7 @@ TOYS = [
                 spots(spots(plain("red"), 14, 5, ["black"]), 5, 1.0, ["orange", "brown"]),
             )
         ),
-        400,
+        600,
     ),
     Toy(
         "leopard",
@@ -188,16 +186,14 @@ TOYS = [
         ),
         Profile(26, 12, 3, 8, 3),
         grained(spots(plain("yellow"), 7.5, 3.6, ["orange", "brown"], ring="black"), 0.12),
-        600,
+        800,
     ),
     Toy(
         "orange",
         disc(0, 0, 34),
         Profile(46, 14, 9, 34, 13),
-        grained(
-            wedges(11, ["orange", "yellow", "orange"], "cream", [31, 34.5], ["cream", "orange"]), 0.25
-        ),
-        450,
+        grained(wedges(11, ["orange", "yellow", "orange"], "cream", [31, 34.5], ["cream", "orange"]), 0.25),
+        700,
     ),
     Toy(
         "pizza",
@@ -215,7 +211,7 @@ TOYS = [
             ),
             0.18,
         ),
-        850,
+        900,
         0.75,
     ),
     Toy(
@@ -229,7 +225,7 @@ TOYS = [
         ),
         Profile(20, 10, 4, 9, 3),
         grained(stripes(4.5, ["red", "black", "yellow", "black"], 15, 3.0), 0.12),
-        850,
+        900,
     ),
     Toy(
         "starfish",
@@ -262,7 +258,7 @@ TOYS = [
             ),
             0.18,
         ),
-        600,
+        850,
     ),
     Toy(
         "zebra",
@@ -276,6 +272,6 @@ TOYS = [
         ),
         Profile(24, 11, 3, 7, 3),
         grained(stripes(4.2, ["black", "cream"], 10, 3.5), 0.10),
-        650,
+        800,
     ),
 ]

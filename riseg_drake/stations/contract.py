@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
+from pydrake.systems import sensors
 from pydrake.systems.framework import Diagram, InputPort, OutputPort, PortDataType
-from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
 
 GROUND_TRUTH = "cheat."
 """Outputs of this prefix exist in simulation only; no stage of the algorithm is ever wired to one."""
@@ -11,23 +11,22 @@ GROUND_TRUTH = "cheat."
 
 @dataclass(frozen=True)
 class StationPort:
-    """One port: a vector of `size`, or an image of type `image`."""
+    """One port: a vector of `size`, or an image of the class of that name in pydrake.systems.sensors."""
 
     name: str
     size: int = 0
-    image: type | None = None
+    image: str = ""
 
     def __str__(self) -> str:
-        kind = self.image.__name__ if self.image else f"vector of {self.size}"
-        return f"{self.name} ({kind})"
+        return f"{self.name} ({self.image or f'vector of {self.size}'})"
 
 
 STATION_INPUTS = (StationPort("panda.position", size=7),)
 """Commanded joint angles, rad."""
 
 STATION_OUTPUTS = (
-    StationPort("wrist.color_image", image=ImageRgba8U),
-    StationPort("wrist.depth_image", image=ImageDepth32F),  # m, aligned to colour, 0 = invalid
+    StationPort("wrist.color_image", image="ImageRgba8U"),
+    StationPort("wrist.depth_image", image="ImageDepth32F"),  # m, aligned to colour, 0 = invalid
     StationPort("wrist.image_time", size=1),  # s, when the two were taken; negative before the first
     StationPort("panda.position_measured", size=7),  # rad
     StationPort("panda.velocity_measured", size=7),  # rad/s
@@ -37,9 +36,7 @@ STATION_OUTPUTS = (
 def check_contract(station: Diagram) -> None:
     """Raise ValueError, naming every difference, unless a station has exactly the ports agreed on."""
     problems = []
-    inputs = {
-        port.get_name(): port for port in map(station.get_input_port, range(station.num_input_ports()))
-    }
+    inputs = {port.get_name(): port for port in map(station.get_input_port, range(station.num_input_ports()))}
     outputs = {
         port.get_name(): port for port in map(station.get_output_port, range(station.num_output_ports()))
     }
@@ -63,7 +60,9 @@ def check_contract(station: Diagram) -> None:
 
 
 def _fits(port: InputPort | OutputPort, agreed: StationPort) -> bool:
-    if agreed.image is None:
+    if not agreed.image:
         return port.get_data_type() == PortDataType.kVectorValued and port.size() == agreed.size
     # Only an output can show what it carries before it is wired; the contract has no image inputs.
-    return isinstance(port, OutputPort) and isinstance(port.Allocate().get_value(), agreed.image)
+    return isinstance(port, OutputPort) and isinstance(
+        port.Allocate().get_value(), getattr(sensors, agreed.image)
+    )

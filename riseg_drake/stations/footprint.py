@@ -96,10 +96,7 @@ def shape_corners(shape: Shape) -> NDArray:
         case Cylinder():
             top = 0.5 * shape.length()
             return np.vstack(
-                [
-                    np.column_stack([_CIRCLE * shape.radius(), np.full(len(_CIRCLE), z)])
-                    for z in (-top, top)
-                ]
+                [np.column_stack([_CIRCLE * shape.radius(), np.full(len(_CIRCLE), z)]) for z in (-top, top)]
             )
         case Capsule():
             top_xyz = np.array([0.0, 0.0, 0.5 * shape.length()])
@@ -108,9 +105,7 @@ def shape_corners(shape: Shape) -> NDArray:
             hull = shape.GetConvexHull()
             return np.array([hull.vertex(i) for i in range(hull.num_vertices())])
         case HalfSpace():
-            raise ValueError(
-                "a half space as collision geometry has no extent; a box or a mesh would do"
-            )
+            raise ValueError("a half space as collision geometry has no extent; a box or a mesh would do")
         case _:
             raise ValueError(f"collision geometry of type {type(shape).__name__} is not supported")
 

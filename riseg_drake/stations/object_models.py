@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,9 +47,7 @@ def find_models(folder_or_url: str, names: Sequence[str] = ()) -> list[ObjectMod
     A `package://` URL may be given for the folder. `names` selects some of them. Raises SceneError.
     """
     folder = _resolve(folder_or_url)
-    found = [
-        path for end in ("sdf", "urdf") for deep in ("", "*/") for path in folder.glob(f"{deep}*.{end}")
-    ]
+    found = [path for end in ("sdf", "urdf") for deep in ("", "*/") for path in folder.glob(f"{deep}*.{end}")]
     if not found:
         raise SceneError(
             f"objects: no models in {folder}; expected *.sdf or *.urdf files, there or one folder down"
@@ -76,9 +73,7 @@ def parse_body(plant: MultibodyPlant, path: Path) -> RigidBody:
         instances = parser.AddModels(path)
     except RuntimeError as error:
         raise SceneError(f"{path} cannot be read: {' '.join(str(error).split())}") from error
-    bodies = [
-        plant.get_body(index) for instance in instances for index in plant.GetBodyIndices(instance)
-    ]
+    bodies = [plant.get_body(index) for instance in instances for index in plant.GetBodyIndices(instance)]
     if len(bodies) != 1:
         raise SceneError(f"{path} has {len(bodies)} bodies; an object of a scene is a single rigid body")
     return bodies[0]
@@ -94,9 +89,7 @@ def measure(name: str, path: Path) -> ObjectModel:
     if not body.is_floating_base_body():
         raise SceneError(f"{path} is fixed to the world; an object of a scene must be free to move")
     if not body.default_mass() > 0:
-        raise SceneError(
-            f"{path} has mass {body.default_mass():g}; an object needs a positive mass in kg"
-        )
+        raise SceneError(f"{path} has mass {body.default_mass():g}; an object needs a positive mass in kg")
     geometries = plant.GetCollisionGeometriesForBody(body)
     if not geometries:
         raise SceneError(f"{path} has no collision geometry; without it nothing can push the object")
@@ -116,9 +109,9 @@ def measure(name: str, path: Path) -> ObjectModel:
     p_BF = R_WB.inverse().multiply(feet.T).T if len(feet) else feet
     if len(feet):
         outline = Footprint(outline.pieces, float(feet[:, 2].min()) - FOOT_RADIUS)
-    friction: Any = inspector.GetProximityProperties(geometries[0]).GetProperty(
-        "material", "coulomb_friction"
-    )
+    surface = inspector.GetProximityProperties(geometries[0]).GetProperty("material", "coulomb_friction")
+    # A copy: what the inspector hands out dies with the scene graph.
+    friction = CoulombFriction(surface.static_friction(), surface.dynamic_friction())
     return ObjectModel(name, path, X_WB, outline, p_BF, friction)
 
 

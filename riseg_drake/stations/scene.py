@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +32,7 @@ __all__ = ["PlacedObject", "SceneConfig", "SceneError", "add_scene", "draw_scene
 
 TABLE_FRICTION = CoulombFriction(0.5, 0.5)
 DROP = 2e-4  # m; how far above its resting height an object starts
+CLEAR = 1e-4  # m; smallest gap, so that nothing starts inside its neighbour
 TRIES = 24  # ways to approach the cluster that are compared for each object
 LAYOUTS = 20  # whole layouts tried before a scene is called impossible
 STILL = (2e-4, 2e-3)  # m/s and rad/s below which an object is at rest
@@ -105,9 +105,7 @@ def draw_scene(config: SceneConfig, rng: np.random.Generator) -> list[PlacedObje
         if not restless:
             return settled
     if restless:
-        raise SceneError(
-            f"{restless}; model it with z up, standing on a face or on three points or more"
-        )
+        raise SceneError(f"{restless}; model it with z up, standing on a face or on three points or more")
     raise SceneError(
         f"{count} objects ({', '.join(model.name for model in chosen)}) do not fit within "
         f"{config.radius:g} m of the middle; ask for fewer, smaller ones, or enlarge radius"
@@ -153,10 +151,8 @@ def settle(placed: Sequence[PlacedObject], config: SceneConfig) -> list[PlacedOb
     plant.set_contact_model(ContactModel.kPoint)
     plant.set_discrete_contact_approximation(DiscreteContactApproximation.kLagged)
     table = Box(4.0, 4.0, 0.5)
-    p_WT: Any = np.array([*config.centre_W, -0.25])  # the stubs know no array type that fits
-    plant.RegisterCollisionGeometry(
-        plant.world_body(), RigidTransform(p_WT), table, "table", TABLE_FRICTION
-    )
+    X_WT = RigidTransform([*config.centre_W, -0.25])
+    plant.RegisterCollisionGeometry(plant.world_body(), X_WT, table, "table", TABLE_FRICTION)
     bodies = [plant.get_body(index) for index in add_scene(plant, placed).values()]
     plant.Finalize()
     simulator = Simulator(builder.Build())
@@ -204,7 +200,7 @@ def _lay_out(
     for model in models:
         touching = rng.uniform() < config.touch_probability
         low, high = (0.0, config.touch_gap) if touching else (config.gap_min, config.gap_max)
-        gap = rng.uniform(low, high)
+        gap = max(rng.uniform(low, high), CLEAR)
         if not prints:
             spots.append((rng.uniform(-np.pi, np.pi), np.zeros(2)))
             prints.append(model.footprint.moved(*spots[0]))
@@ -265,15 +261,14 @@ def _centred(
 def _stand(model: ObjectModel, yaw: float, p_xy: NDArray) -> PlacedObject:
     """A model turned by `yaw` about the vertical, its lowest point a little above the table."""
     R_WB = RotationMatrix.MakeZRotation(yaw).multiply(model.X_WB.rotation())
-    p_WB: Any = np.array([*p_xy, DROP - model.footprint.bottom])
-    X_WB = RigidTransform(R_WB, p_WB)
+    X_WB = RigidTransform(R_WB, [*p_xy, DROP - model.footprint.bottom])
     return PlacedObject(model, X_WB)
 
 
 def _restless(placed: Sequence[PlacedObject], settled: Sequence[PlacedObject]) -> str:
     """What is wrong with a settled scene: an object that fell over, rolled away or sank; or nothing."""
     for before, after in zip(placed, settled, strict=True):
-        shift = np.linalg.norm(np.subtract(after.X_WB.translation(), before.X_WB.translation()))
+        shift = np.linalg.norm(after.X_WB.translation() - before.X_WB.translation())
         angle = (before.X_WB.rotation().inverse().multiply(after.X_WB.rotation())).ToAngleAxis().angle()
         if shift > 0.005 or angle > np.radians(3.0):
             return (

@@ -1,8 +1,8 @@
 """What a RealSense D415 makes of a perfect picture: noise, gaps and rounding of colour and depth.
 
 The D415 triangulates: a disparity d = f b / z is measured with an error of some hundredths of a pixel,
-so depth errs by z^2 sigma_d / (f b), alike over the few pixels of a matching window; what only one of the
-two imagers sees has no depth; the result is rounded to millimetres.
+so depth errs by z^2 sigma_d / (f b), alike over the few pixels of a matching window; what only one of
+the two imagers sees has no depth; the result is rounded to millimetres.
 """
 
 from dataclasses import dataclass
@@ -42,17 +42,16 @@ class SensorNoise:
 
 def depth_std(depth: NDArray, noise: SensorNoise) -> NDArray:
     """Standard deviation of the depth noise, m, at a depth, m (rounding not included)."""
-    return depth**2 * (noise.disparity_std / (noise.focal_length * noise.baseline))
+    return depth * depth * np.float32(noise.disparity_std / (noise.focal_length * noise.baseline))
 
 
-def noisy_color(
-    color: NDArray[np.uint8], noise: SensorNoise, rng: np.random.Generator
-) -> NDArray[np.uint8]:
+def noisy_color(color: NDArray[np.uint8], noise: SensorNoise, rng: np.random.Generator) -> NDArray[np.uint8]:
     """Colour [H, W, 3] as the sensor reports it, saturating at 0 and 255."""
     if not noise.enabled or noise.color_std == 0:
         return color
     levels = np.round(noise.color_std * _normal_quantiles()).astype(np.int8)
-    return cv2.add(color, cv2.LUT(_random_bytes(color.shape, rng), levels), dtype=cv2.CV_8U)
+    drawn = cv2.LUT(_random_bytes(color.shape, rng), levels)
+    return np.asarray(cv2.add(color, drawn, dtype=cv2.CV_8U), np.uint8)
 
 
 def noisy_depth(
@@ -66,45 +65,50 @@ def noisy_depth(
         valid &= ~occlusion_shadow(depth, noise)
     if noise.edge_dropout > 0:
         valid &= ~(_edges(depth, noise.edge_step) & _drawn(noise.edge_dropout, depth.shape, rng))
-    noisy = depth + depth_std(depth, noise) * _correlated_normal(depth.shape, noise.correlation, rng)
+    noisy = _correlated_normal(depth.shape, noise.correlation, rng)
+    noisy *= depth_std(depth, noise)
+    noisy += depth
     if noise.quantum > 0:
-        noisy = np.rint(noisy * np.float32(1 / noise.quantum)) * np.float32(noise.quantum)
-    return np.where(valid, noisy, np.float32(0))
+        np.rint(np.multiply(noisy, np.float32(1 / noise.quantum), out=noisy), out=noisy)
+        noisy *= np.float32(noise.quantum)
+    noisy[~valid] = 0
+    return noisy
 
 
 def occlusion_shadow(depth: NDArray[np.float32], noise: SensorNoise) -> NDArray[np.bool_]:
-    """Pixels [H, W] that only the left imager sees: left of an edge behind which something nearer begins.
+    """Pixels [H, W] that only the left imager sees: those just left of something nearer.
 
     A point at column u lands in the right imager at u - d. It is hidden there if a point further right,
     necessarily nearer, lands at the same column or left of it.
     """
-    strength = np.float32(noise.focal_length * noise.baseline)
-    columns = np.arange(depth.shape[1], dtype=np.float32)
-    landing = np.where(depth > 0, columns - strength / np.maximum(depth, np.float32(1e-3)), np.inf)
+    invalid = depth == 0
+    with np.errstate(divide="ignore"):
+        landing = np.float32(-noise.focal_length * noise.baseline) / depth
+    landing += np.arange(depth.shape[1], dtype=np.float32)
+    landing[invalid] = np.inf
     leftmost_from_here_on = np.minimum.accumulate(landing[:, ::-1], axis=1)[:, ::-1]
     shadow = np.zeros(depth.shape, bool)
-    shadow[:, :-1] = landing[:, :-1] >= leftmost_from_here_on[:, 1:]
-    return shadow & (depth > 0)
+    np.greater_equal(landing[:, :-1], leftmost_from_here_on[:, 1:], out=shadow[:, :-1])
+    shadow[invalid] = False
+    return shadow
 
 
 def _edges(depth: NDArray[np.float32], step: float) -> NDArray[np.bool_]:
-    """Pixels with a neighbour whose depth differs by more than `step`; invalid pixels make no edge."""
-    window = np.ones((3, 3), np.uint8)
-    farthest = cv2.dilate(depth, window)
-    nearest = cv2.erode(np.where(depth > 0, depth, np.float32(np.inf)), window)
-    return farthest - nearest > step
+    """Pixels about which depth differs by more than `step`, m; what is invalid counts as at 0."""
+    return cv2.morphologyEx(depth, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8)) > step
 
 
-def _correlated_normal(
-    shape: tuple[int, ...], width: float, rng: np.random.Generator
-) -> NDArray[np.float32]:
+def _correlated_normal(shape: tuple[int, ...], width: float, rng: np.random.Generator) -> NDArray[np.float32]:
     """Normal noise of unit variance [H, W] that is alike over `width` px."""
-    white = cv2.LUT(_random_bytes(shape, rng), _normal_quantiles().astype(np.float32))
+    table = _normal_quantiles().astype(np.float32)
+    white = np.asarray(cv2.LUT(_random_bytes(shape, rng), table), np.float32)
     if width <= 0:
         return white
-    kernel = cv2.getGaussianKernel(2 * int(np.ceil(3 * width)) + 1, width, cv2.CV_32F)
-    kernel /= np.linalg.norm(kernel)  # keeps the variance, not the mean
-    return cv2.sepFilter2D(white, cv2.CV_32F, kernel, kernel)
+    size = 2 * int(np.ceil(3 * width)) + 1
+    kernel = cv2.getGaussianKernel(size, width)
+    blurred = np.asarray(cv2.GaussianBlur(white, (size, size), width), np.float32)
+    blurred /= np.float32(np.sum(kernel**2))  # the standard deviation that weights k (x) k leave
+    return blurred
 
 
 def _drawn(share: float, shape: tuple[int, ...], rng: np.random.Generator) -> NDArray[np.bool_]:
@@ -117,7 +121,7 @@ def _random_bytes(shape: tuple[int, ...], rng: np.random.Generator) -> NDArray[n
 
 @lru_cache(maxsize=1)
 def _normal_quantiles() -> NDArray[np.float64]:
-    """Unit normal noise for every byte: looking random bytes up is ten times as fast as drawing normals."""
+    """Unit normal noise for every byte; looking bytes up is ten times as fast as drawing normals."""
     quantiles = ndtri((np.arange(256) + 0.5) / 256)
     quantiles /= quantiles.std()
     quantiles.flags.writeable = False

@@ -20,7 +20,6 @@ from pydrake.geometry import (
     RenderEngineVtkParams,
     Rgba,
     Role,
-    RoleAssign,
     SceneGraph,
 )
 from pydrake.math import RigidTransform
@@ -41,7 +40,6 @@ from riseg_drake.robot.kinematics import PandaKinematics, observe_pose
 from riseg_drake.stations.scene import (
     PlacedObject,
     SceneConfig,
-    SceneError,
     add_scene,
     draw_scene,
     object_id_table,
@@ -49,6 +47,7 @@ from riseg_drake.stations.scene import (
 from riseg_drake.stations.wrist_camera import CameraConfig, ObjectLabels, WristCamera
 
 RENDERER = "renderer"
+CLIPPING = (0.01, 10.0)  # m; what the renderer draws, wider than what the sensor measures
 
 
 def soft_light() -> RenderEngineVtkParams:
@@ -128,7 +127,9 @@ class SimulatedStation(Diagram):
         for instance in (panda.arm, panda.pusher):
             plant.set_gravity_enabled(instance, False)
         _add_table(plant, scene_graph, config.table)
-        self.objects = list(objects or draw_scene(config.scene, np.random.default_rng(seed)))
+        if objects is None:
+            objects = draw_scene(config.scene, np.random.default_rng(seed))
+        self.objects = list(objects)
         """The scene as it was at the start; object id i + 1 is `objects[i]`."""
         self.object_bodies = add_scene(plant, self.objects)
         """Index of the body of each object id."""
@@ -147,7 +148,7 @@ class SimulatedStation(Diagram):
         self.set_name("station")
 
     def _wire_arm(self, builder: DiagramBuilder, arm: ModelInstanceIndex, step: float) -> None:
-        """Commands pass through with their rate of change as desired velocity, so that the arm does not lag."""
+        """Commands go in with their rate of change as desired velocity, so that the arm does not lag."""
         reference = builder.AddNamedSystem("reference", StateInterpolatorWithDiscreteDerivative(7, step))
         split = builder.AddNamedSystem("measured", Demultiplexer([7, 7]))
         builder.Connect(reference.get_output_port(), self.plant.get_desired_state_input_port(arm))
@@ -163,7 +164,7 @@ class SimulatedStation(Diagram):
         core = RenderCameraCore(
             RENDERER,
             CameraInfo(k.width, k.height, k.fx, k.fy, k.cx, k.cy),
-            ClippingRange(0.01, 10.0),
+            ClippingRange(*CLIPPING),
             RigidTransform(),
         )
         sensor = builder.AddNamedSystem(
@@ -172,10 +173,10 @@ class SimulatedStation(Diagram):
                 self.plant.GetBodyFrameIdOrThrow(frame.body().index()),
                 frame.GetFixedPoseInBodyFrame(),
                 ColorRenderCamera(core),
-                DepthRenderCamera(core, DepthRange(k.depth_min, k.depth_max)),
+                DepthRenderCamera(core, DepthRange(*CLIPPING)),
             ),
         )
-        # A quarter of a step after the plant's own: joint angles read within the millisecond that follows
+        # A quarter of a step after the plant's own: joint angles read within the millisecond after that
         # are those of the picture.
         camera = builder.AddNamedSystem("wrist_camera", WristCamera(k, seed, 1 / k.rate, step / 4))
         labels = builder.AddNamedSystem("labels", ObjectLabels(k, object_id_table(self.object_bodies)))
@@ -196,13 +197,11 @@ def start_position(config: SimulatedStationConfig) -> list[float]:
             raise ValueError(f"start_position: {len(config.start_position)} angles; expected 7, in rad")
         return config.start_position
     kinematics = PandaKinematics(config.panda)
-    q = kinematics.solve_ik(
-        observe_pose([*config.scene.centre_W, 0.0], config.observe_height, kinematics.X_EC)
-    )
+    q = kinematics.solve_ik(observe_pose([*config.scene.centre_W, 0.0], config.observe_height, kinematics.X_EC))
     if q is None:
         raise ValueError(
-            f"observe_height: no posture looks at {config.scene.centre_W} from {config.observe_height} m; "
-            "0.5 m above (0.5, 0) is within reach"
+            f"observe_height: no posture looks at {config.scene.centre_W} from {config.observe_height} "
+            "m; 0.5 m above (0.5, 0) is within reach"
         )
     return list(q)
 
@@ -227,12 +226,17 @@ def _add_table(plant: MultibodyPlant, scene_graph: SceneGraph, config: TableConf
         return
     if config.texture and not Path(config.texture).is_file():
         raise ValueError(f"table texture: no file {config.texture}; expected a PNG or JPEG image")
+    source = plant.get_source_id()
     for geometry in plant.GetVisualGeometriesForBody(body):
-        for properties in (PerceptionProperties(), IllustrationProperties()):
-            properties.AddProperty("phong", "diffuse", Rgba(*(config.color or [1.0, 1.0, 1.0])))
-            if config.texture:
-                properties.AddProperty("phong", "diffuse_map", config.texture)
-            if isinstance(properties, PerceptionProperties):
-                old = scene_graph.model_inspector().GetPerceptionProperties(geometry)
-                properties.AddProperty("label", "id", old.GetProperty("label", "id"))
-            scene_graph.AssignRole(plant.get_source_id(), geometry, properties, RoleAssign.kReplace)
+        old = scene_graph.model_inspector().GetPerceptionProperties(geometry)
+        looks = PerceptionProperties()
+        looks.AddProperty("label", "id", old.GetProperty("label", "id"))
+        looks.AddProperty("phong", "diffuse", Rgba(*(config.color or [1.0, 1.0, 1.0])))
+        # Taken off and put on again, since what cameras see cannot be replaced in one go.
+        for role in (Role.kPerception, Role.kIllustration):
+            scene_graph.RemoveRole(source, geometry, role)
+        # Meshcat draws no texture on a box: it shows the colour alone.
+        scene_graph.AssignRole(source, geometry, IllustrationProperties(looks))
+        if config.texture:
+            looks.AddProperty("phong", "diffuse_map", config.texture)
+        scene_graph.AssignRole(source, geometry, looks)

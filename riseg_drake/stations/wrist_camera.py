@@ -1,4 +1,4 @@
-"""The simulated D415: takes a picture at its own rate, with its own noise, and holds it until the next."""
+"""The simulated D415: takes a picture at its own rate, with its own noise, and holds it."""
 
 from dataclasses import dataclass, field
 
@@ -15,7 +15,7 @@ from riseg_drake.stations.sensor_noise import SensorNoise, noisy_color, noisy_de
 
 @dataclass
 class CameraConfig:
-    """A D415's colour camera with depth aligned to it (848x480 as measured, here its central 640x480)."""
+    """A D415's colour camera, 848x480 cropped to its central 640x480, with depth aligned to it."""
 
     width: int = 640
     """px"""
@@ -47,14 +47,15 @@ class WristCamera(LeafSystem):
     """Takes a noisy picture of what the ideal sensor at its inputs shows, and holds it.
 
     Inputs `color_image` (ImageRgba8U) and `depth_image` (ImageDepth32F) are evaluated at the pictures'
-    times only: at the start, then every `period` after `delay`. Outputs of the same names and `image_time`
-    (s) are always of one instant; before the first picture the images are black and the time is -1.
-    The noise depends on the seed and on the number of the picture alone.
+    times only: at the start, then every `period`, `delay` late. Outputs of the same names and
+    `image_time` (s) are always of one instant; before the first picture the images are black and the
+    time is -1. The noise depends on the seed and on the number of the picture alone.
     """
 
     def __init__(self, config: CameraConfig, seed: int, period: float, delay: float):
         super().__init__()
         self._noise = config.noise
+        self._depth_range = (config.depth_min, config.depth_max)
         self._seed = seed
         size = (config.width, config.height)
         self._color_in = self.DeclareAbstractInputPort("color_image", Value(ImageRgba8U(*size)))
@@ -83,14 +84,14 @@ class WristCamera(LeafSystem):
         seen = self._color_in.Eval(context).data
         color.mutable_data[:] = seen
         color.mutable_data[..., :3] = noisy_color(np.ascontiguousarray(seen[..., :3]), self._noise, rng)
-        depth.mutable_data[..., 0] = noisy_depth(
-            sanitize_depth(self._depth_in.Eval(context).data[..., 0]), self._noise, rng
-        )
+        measured = noisy_depth(sanitize_depth(self._depth_in.Eval(context).data[..., 0]), self._noise, rng)
+        nearest, farthest = self._depth_range
+        depth.mutable_data[..., 0] = measured * ((measured >= nearest) & (measured <= farthest))
         stamp.set_value([context.get_time(), number])
 
 
 class ObjectLabels(LeafSystem):
-    """Translates Drake's label image into object ids by a table [32768]; drawn only when it is asked for."""
+    """Translates Drake's label image into object ids by a table [32768], when it is asked for."""
 
     def __init__(self, config: CameraConfig, table: NDArray[np.int16]):
         super().__init__()

@@ -94,8 +94,8 @@ def test_mass_and_inertia_are_those_of_the_solid_inside_the_mesh(model):
     volume = CalcSpatialInertia(mesh, 1.0).get_mass()
     expected = CalcSpatialInertia(mesh, inertia.get_mass() / volume)
     assert inertia.IsPhysicallyValid()
-    assert 0.035 < inertia.get_mass() < 0.2
-    assert 300 <= inertia.get_mass() / volume <= 900
+    assert 0.040 < inertia.get_mass() < 0.2
+    assert 299.5 < inertia.get_mass() / volume < 900.5  # wood to solid rubber; the files are rounded
     np.testing.assert_allclose(inertia.get_com(), expected.get_com(), atol=5e-5)
     scale = np.trace(expected.CopyToFullMatrix6()[:3, :3])
     np.testing.assert_allclose(
@@ -124,9 +124,7 @@ def test_collision_pieces_follow_the_solid_and_only_feet_reach_the_table(model):
     assert len(model.feet) == 0, "a toy brings its own feet"
     feet = re.findall(r'name="foot_\d+">\s*<pose>(\S+) (\S+)', model.path.read_text())
     hull = cv2.convexHull(np.array(feet, np.float32))
-    assert cv2.pointPolygonTest(hull, (0.0, 0.0), True) > 0.004, (
-        "the centre of mass is well between the feet"
-    )
+    assert cv2.pointPolygonTest(hull, (0.0, 0.0), True) > 0.004, "the centre of mass is well between the feet"
 
 
 @pytest.mark.renders
@@ -160,9 +158,7 @@ class PushingBench:
             CoulombFriction(0.5, 0.5),
         )
         self.plant, self.bodies, home = plant, [], []
-        tip = Footprint(
-            (np.array([[-0.01, -0.015], [0.01, -0.015], [0.01, 0.015], [-0.01, 0.015]]),), 0.0
-        )
+        tip = Footprint((np.array([[-0.01, -0.015], [0.01, -0.015], [0.01, 0.015], [-0.01, 0.015]]),), 0.0)
         ahead = np.array([1.0, 0.0])
         for k, model in enumerate(MODELS):
             y = 0.2 * k - 1.6
@@ -181,9 +177,7 @@ class PushingBench:
                 f"bar_{k}",
                 CoulombFriction(0.4, 0.4),
             )
-            joint = plant.AddJoint(
-                PrismaticJoint(f"bar_{k}", plant.world_frame(), bar.body_frame(), [1, 0, 0])
-            )
+            joint = plant.AddJoint(PrismaticJoint(f"bar_{k}", plant.world_frame(), bar.body_frame(), [1, 0, 0]))
             home.append(travel(tip.moved(0.0, [-0.3, 0]), model.footprint, ahead) - 0.3 - self.lead)
             joint.set_default_translation(home[-1])
             actuator = plant.AddJointActuator(f"bar_{k}", joint, 1e3)
@@ -193,9 +187,7 @@ class PushingBench:
         way = np.array(home)[:, None] + np.array([[0.0, 0.0, 1.0, 1.0]]) * (self.length + self.lead)
         path = PiecewisePolynomial.FirstOrderHold([0.0, self.start, self.stop, 10.0], way)
         source = builder.AddSystem(TrajectorySource(path, 1))
-        builder.Connect(
-            source.get_output_port(), plant.get_desired_state_input_port(default_model_instance())
-        )
+        builder.Connect(source.get_output_port(), plant.get_desired_state_input_port(default_model_instance()))
         self.simulator = Simulator(builder.Build())
         self.context = plant.GetMyContextFromRoot(self.simulator.get_context())
 
@@ -225,9 +217,7 @@ def test_toys_rest_still_slide_upright_when_pushed_and_stop():
         shift, turn, _ = moved(placed[k], rested[k])
         assert np.linalg.norm(shift) < 2e-4, f"{model.name} creeps at rest"
         assert turn < 0.2 * degree, f"{model.name} turns at rest"
-        assert max(moved(rested[k], poses[k])[2] for poses in during) < 3 * degree, (
-            f"{model.name} topples"
-        )
+        assert max(moved(rested[k], poses[k])[2] for poses in during) < 3 * degree, f"{model.name} topples"
         shift, turn, _ = moved(rested[k], pushed[k])
         # Pushed beside its centre of mass a toy turns, and the centre goes less far than the bar.
         assert 0.016 < shift[0] < 0.021, f"{model.name} does not slide along"

@@ -30,8 +30,7 @@ from riseg_drake.stations.scene import (
 
 SEEDS = range(6)
 INERTIAL = (
-    "<inertial><mass>0.1</mass>"
-    "<inertia><ixx>6e-5</ixx><iyy>6e-5</iyy><izz>7e-5</izz></inertia></inertial>"
+    "<inertial><mass>0.1</mass><inertia><ixx>6e-5</ixx><iyy>6e-5</iyy><izz>7e-5</izz></inertia></inertial>"
 )
 
 
