@@ -1,24 +1,117 @@
-"""`riseg bench`: what each stage of Alg. 2 costs in time and memory."""
+"""`riseg bench`: what each stage of Alg. 2 costs in time and memory, for one image pair."""
 
 import tracemalloc
-from collections import defaultdict
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from itertools import islice
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
-import numpy as np
+from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 from rich.console import Console
 
-from riseg_drake.app.diagram import Segmentation, make_diagram, make_segmentation
+from riseg_drake.app.diagram import make_diagram
 from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.interactions import Progress, interactions
 from riseg_drake.app.output import stage_figures
 from riseg_drake.app.run import peak_memory_mb
 from riseg_drake.app.scenario import Scenario, load_scenario
+from riseg_drake.app.scenario_file import ScenarioError
+from riseg_drake.app.segmentation_block import STATION_PORTS, make_segmentation
 from riseg_drake.app.tables import stage_table
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pushing.push import ArmPhase
+from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.systems.stage_clock import StageClock
+
+REPETITIONS = 4
+"""How often the push is gone through for times."""
+WHOLE = "whole pair"
+
+
+StationOutputs = dict[str, Any]
+"""What a station gave at one tick of the camera, by the names of the segmentation's inputs."""
+
+
+def bench_command(scenario_file: Path | None, seed: int, console: Console) -> None:
+    """Render one push, put it through the segmentation again and again, print what it cost."""
+    scenario = load_scenario(scenario_file)
+    require_graphics()
+    with console.status("rendering a push"):
+        images = push_images(scenario, seed)
+    with console.status("measuring time"):
+        clock = StageClock()
+        for _ in range(REPETITIONS):
+            _segment(scenario, images, clock)
+    with console.status("measuring memory"):
+        memory = _StageMemory()
+        tracemalloc.start()
+        _segment(scenario, images, memory)
+        tracemalloc.stop()
+    stages = stage_figures(clock.seconds)
+    for stage, peaks in memory.peaks.items():
+        stages[stage]["peak_mb"] = max(peaks) / 1e6
+    camera = scenario.station.camera
+    console.print(
+        stage_table(stages, f"Alg. 2 for one {camera.width}x{camera.height} image pair, during a push")
+    )
+    console.print(
+        f"peak MB is what a stage allocates in Python while it works; "
+        f"the whole process, simulation and all, took {peak_memory_mb()} MB at most"
+    )
+
+
+def push_images(scenario: Scenario, seed: int) -> list[StationOutputs]:
+    """The station's outputs at every frame of the first push. Raises ScenarioError if there is none."""
+    wired = make_diagram(scenario, seed)
+    progress = Progress()
+    images: list[StationOutputs] = []
+
+    def keep(_: Frame, context: Context) -> None:
+        if wired.phase(context) is ArmPhase.PUSH:
+            images.append({name: wired.copy(port, context) for name, port in STATION_PORTS.items()})
+        elif images:
+            progress.end = "the push is over"
+
+    for _ in interactions(wired, StageClock(), progress, scenario.longest, (keep,)):
+        pass
+    if len(images) < 2:
+        raise ScenarioError(f"with seed {seed} the arm finds nothing to push; choose another seed")
+    return images
+
+
+class _StageMemory(StageClock):
+    """Books the peak of the memory that Python objects and arrays take in each call, bytes."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.peaks: dict[str, list[int]] = {}
+
+    def measure(self, stage: str, work: Callable[[], Any]) -> Any:
+        """Do the work; what it allocates above what was there before is the stage's."""
+        tracemalloc.reset_peak()
+        before, _ = tracemalloc.get_traced_memory()
+        try:
+            return work()
+        finally:
+            _, peak = tracemalloc.get_traced_memory()
+            self.peaks.setdefault(stage, []).append(peak - before)
+
+
+def _segment(scenario: Scenario, images: Sequence[StationOutputs], clock: StageClock) -> None:
+    """Put the images through Alg. 2, one tick of the camera each, and book every stage and the whole."""
+    period = 1 / scenario.station.camera.rate
+    kinematics = PandaKinematics(scenario.station.panda)
+    diagram, stages = make_segmentation(scenario, kinematics, seed=0)
+    simulator = Simulator(diagram)
+    context = simulator.get_mutable_context()
+    for tick, now in enumerate(images):
+        for name, value in now.items():
+            diagram.GetInputPort(name).FixValue(context, value)
+        if tick == 0:  # the first frame has no partner, and fills what is computed once for all
+            simulator.AdvanceTo(period)
+            clock.watch(stages)
+            continue
+        start = perf_counter()
+        simulator.AdvanceTo((tick + 1) * period)
+        clock.seconds[WHOLE].append(perf_counter() - start)

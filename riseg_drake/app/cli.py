@@ -1,6 +1,7 @@
 """The command line, `riseg`: what can be asked for, and how it is said when something is wrong."""
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -28,6 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt as stop:
         print(f"riseg: stopped{f'; {stop}' if str(stop) else ''}", file=sys.stderr)
         return INTERRUPTED
+    except BrokenPipeError:  # whoever read our output has enough, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except Exception as error:
         if not isinstance(error, _mistakes()):
             raise
@@ -50,9 +53,7 @@ def _parser() -> argparse.ArgumentParser:
         "Writes pictures, masks and scores of every interaction to the output folder.",
     )
     _add_scenario(run)
-    run.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="draws the scene and the noise (0)"
-    )
+    run.add_argument("--seed", type=int, default=0, metavar="N", help="draws the scene and the noise (0)")
     run.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/SCENARIO_seed_N)")
     run.add_argument("--record", action="store_true", help="also write every frame to DIR/recording")
     run.add_argument(
@@ -81,9 +82,7 @@ def _parser() -> argparse.ArgumentParser:
         "The pairs are a rendered push, held in memory; nothing is written.",
     )
     _add_scenario(bench)
-    bench.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="draws the scene and the noise (0)"
-    )
+    bench.add_argument("--seed", type=int, default=0, metavar="N", help="draws the scene and the noise (0)")
 
     diagram = _add(
         commands,
@@ -149,5 +148,6 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.app.scenario_file import ScenarioError
     from riseg_drake.evaluation.label_folders import LabelFolderError
     from riseg_drake.recording.layout import RecordingError
+    from riseg_drake.stations.scene import SceneError
 
-    return NoGraphicsError, OutputError, ScenarioError, LabelFolderError, RecordingError
+    return NoGraphicsError, OutputError, ScenarioError, SceneError, LabelFolderError, RecordingError

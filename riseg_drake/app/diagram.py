@@ -5,13 +5,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import Meshcat
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder, LeafSystem, OutputPort
+from pydrake.systems.framework import (
+    Context,
+    Diagram,
+    DiagramBuilder,
+    LeafSystem,
+    OutputPort,
+    PortDataType,
+)
 
 from riseg_drake.app.meshcat_view import MeshcatView
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.scenario_file import ScenarioError
-from riseg_drake.app.segmentation_block import add_segmentation
-from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.app.segmentation_block import STATION_PORTS, add_segmentation
 from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.pushing.push import ArmPhase
 from riseg_drake.robot.kinematics import PandaKinematics
@@ -29,20 +35,34 @@ class WiredDiagram:
     `interaction_step`, `active_push`.
     """
 
-    def __init__(self, diagram: Diagram, station: SimulatedStation, stages: list[LeafSystem], intrinsics: Intrinsics):
+    def __init__(
+        self, diagram: Diagram, station: SimulatedStation, stages: list[LeafSystem], scenario: Scenario
+    ):
         self.diagram = diagram
         self.stages = stages
-        self.intrinsics = intrinsics
+        self.intrinsics = scenario.station.camera.intrinsics
+        self.most_interactions = scenario.arm.most_interactions
         self.object_names = {i: placed.name for i, placed in enumerate(station.objects, start=1)}
         """By object id, as in the ground truth."""
         self._object_bodies = station.object_bodies
         self._ports: dict[str, OutputPort] = {}
 
     def read(self, port: str, context: Context) -> Any:
-        """The present value of an exported output."""
-        if port not in self._ports:
-            self._ports[port] = self.diagram.GetOutputPort(port)
-        return self._ports[port].Eval(context)
+        """The present value of an exported output; Drake may write the next one into the same place."""
+        return self._port(port).Eval(context)
+
+    def copy(self, port: str, context: Context) -> Any:
+        """The same to keep: an array, or an AbstractValue that can be given to an input port."""
+        output = self._port(port)
+        if output.get_data_type() == PortDataType.kVectorValued:
+            return np.array(output.Eval(context))
+        return output.EvalAbstract(context).Clone()
+
+    def _port(self, name: str) -> OutputPort:
+        # Looked up once: some ports are read after every step of the simulation.
+        if name not in self._ports:
+            self._ports[name] = self.diagram.GetOutputPort(name)
+        return self._ports[name]
 
     def pair(self, context: Context) -> FramePair | None:
         """The frames of t-1 and t; None before the first."""
@@ -92,18 +112,16 @@ def make_diagram(scenario: Scenario, seed: int, meshcat: Meshcat | None = None) 
         q_observe = np.array(start_position(config))
     except (ValueError, RuntimeError) as error:
         raise ScenarioError(" ".join(str(error).split())) from error
-    intrinsics = config.camera.intrinsics
     kinematics = PandaKinematics(config.panda)
 
     builder = DiagramBuilder()
     builder.AddSystem(station)
-    segmentation = add_segmentation(builder, scenario, intrinsics, kinematics, 1 / config.camera.rate, seed)
+    segmentation = add_segmentation(builder, scenario, kinematics, seed)
     planner = builder.AddNamedSystem("PushPlanner", PushPlanner(kinematics, scenario.push, seed))
     arm = builder.AddNamedSystem("ArmMotion", ArmMotion(q_observe, scenario.arm))
 
-    for name in ("color_image", "depth_image", "image_time"):
-        builder.Connect(station.GetOutputPort(f"wrist.{name}"), segmentation.inputs[name])
-    builder.Connect(station.GetOutputPort("panda.position_measured"), segmentation.inputs["position"])
+    for name, port in STATION_PORTS.items():
+        builder.Connect(station.GetOutputPort(port), segmentation.inputs[name])
     for name in ("pair", "above_table", "mask"):
         builder.Connect(segmentation.outputs[name], planner.GetInputPort(name))
     for name in ("pair", "mask"):
@@ -111,9 +129,7 @@ def make_diagram(scenario: Scenario, seed: int, meshcat: Meshcat | None = None) 
     builder.Connect(arm.GetOutputPort("position"), planner.GetInputPort("position"))
     builder.Connect(arm.GetOutputPort("tried_pushes"), planner.GetInputPort("tried_pushes"))
     builder.Connect(planner.GetOutputPort("push"), arm.GetInputPort("push"))
-    builder.Connect(
-        station.GetOutputPort("panda.position_measured"), arm.GetInputPort("position_measured")
-    )
+    builder.Connect(station.GetOutputPort("panda.position_measured"), arm.GetInputPort("position_measured"))
     builder.Connect(arm.GetOutputPort("position"), station.GetInputPort("panda.position"))
     if meshcat is not None:
         view = builder.AddSystem(MeshcatView(meshcat, 1 / config.camera.rate))
@@ -131,6 +147,4 @@ def make_diagram(scenario: Scenario, seed: int, meshcat: Meshcat | None = None) 
         builder.ExportOutput(arm.GetOutputPort(name), name)
     diagram = builder.Build()
     diagram.set_name("rt-RISeg")
-    return WiredDiagram(diagram, station, [*segmentation.stages, planner, arm], intrinsics)
-
-
+    return WiredDiagram(diagram, station, [*segmentation.stages, planner, arm], scenario)

@@ -22,7 +22,7 @@ def diagram_command(scenario_file: Path | None, output: Path | None, console: Co
     require_graphics()
     dot = draw(make_diagram(scenario, seed=0).diagram)
     if output is None:
-        print(dot)
+        print(dot, flush=True)
         return
     content = _to_svg(dot) if output.suffix == ".svg" else dot.encode()
     try:
@@ -41,9 +41,7 @@ def _check_output(output: Path) -> None:
     if output.suffix not in (".dot", ".svg"):
         raise OutputError(f"{output}: the name must end in .dot or .svg")
     if output.suffix == ".svg" and shutil.which("dot") is None:
-        raise OutputError(
-            "SVG needs the program dot; install the package graphviz, or ask for a .dot file"
-        )
+        raise OutputError("SVG needs the program dot; install the package graphviz, or ask for a .dot file")
 
 
 def _to_svg(dot: str) -> bytes:

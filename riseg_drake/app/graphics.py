@@ -40,9 +40,9 @@ def _some_device_starts(egl: ctypes.CDLL) -> bool:
     query_devices = ctypes.CFUNCTYPE(
         ctypes.c_uint, ctypes.c_int, ctypes.POINTER(ctypes.c_void_p), ctypes.POINTER(ctypes.c_int)
     )(query_address)
-    platform_display = ctypes.CFUNCTYPE(
-        ctypes.c_void_p, ctypes.c_uint, ctypes.c_void_p, ctypes.c_void_p
-    )(display_address)
+    platform_display = ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_uint, ctypes.c_void_p, ctypes.c_void_p)(
+        display_address
+    )
     initialize = egl.eglInitialize
     initialize.argtypes, initialize.restype = [ctypes.c_void_p] * 3, ctypes.c_uint
 
@@ -50,7 +50,5 @@ def _some_device_starts(egl: ctypes.CDLL) -> bool:
     number = ctypes.c_int(0)
     if query_devices(_MOST_DEVICES, devices, ctypes.byref(number)) == _EGL_FALSE:
         return False
-    displays = (
-        platform_display(_EGL_PLATFORM_DEVICE, device, None) for device in devices[: number.value]
-    )
+    displays = (platform_display(_EGL_PLATFORM_DEVICE, device, None) for device in devices[: number.value])
     return any(display and initialize(display, None, None) != _EGL_FALSE for display in displays)

@@ -1,8 +1,10 @@
 """Alg. 1: the robot acts and segments, and every interaction leaves L*_t behind."""
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
 
+import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, EventStatus
@@ -59,19 +61,29 @@ def interactions(
             news.mask_is_new = False
             progress.frames += 1
             progress.objects = len(wired.segmentation(context).object_ids)
-            book.frames += 1
+            book.count(news.frame, is_at_rest=news.phase is ArmPhase.OBSERVE)
             for listener in listeners:
                 listener(news.frame, context)
         decided = progress.phase is ArmPhase.OBSERVE and news.phase is not ArmPhase.OBSERVE
         progress.time, progress.phase = context.get_time(), news.phase
         if decided:
-            # The arm has looked and chosen, but not moved yet: picture, mask and truth are of one moment.
-            yield book.close(wired.interaction_step(context), news.frame)  # line 10
+            yield book.close(wired.interaction_step(context))  # line 10
             progress.interaction_step += 1  # line 9
         if news.phase is ArmPhase.DONE:
-            progress.end = "the arm is done: no push left, or as many made as were asked for"
+            made = wired.interaction_step(context)
+            enough = made >= wired.most_interactions
+            progress.end = (
+                f"{made} of {made} interactions were made" if enough else "no push is left that could find more"
+            )
         elif progress.time >= longest:
             progress.end = f"{longest:g} s were simulated"
+
+
+class _Seen(NamedTuple):
+    frame: Frame
+    mask: NDArray[np.uint16]
+    true_labels: NDArray[np.uint16]
+    true_poses: dict[str, NDArray[np.float64]]
 
 
 class _News:
@@ -100,33 +112,40 @@ class _News:
         return EventStatus.ReachedTermination(self._wired.diagram, "news")
 
 
-@dataclass
 class _Book:
-    """What is counted between two steps."""
+    """What is counted between two steps, and what was last seen from the observation posture."""
 
-    wired: WiredDiagram
-    context: Context
-    clock: StageClock
-    frames: int = 0
-    poses: Mapping[str, NDArray] = field(default_factory=dict)
+    def __init__(self, wired: WiredDiagram, context: Context, clock: StageClock):
+        self._wired, self._context, self._clock = wired, context, clock
+        self._frames = 0
+        self._poses: dict[str, NDArray] = {}
+        self._seen: _Seen | None = None
 
-    def close(self, interaction_step: int, frame: Frame) -> Step:
-        """The step that ends now; the count starts anew."""
-        mask = self.wired.mask(self.context)
-        ground_truth = self.wired.true_labels(self.context)
-        poses = self.wired.true_poses(self.context)
+    def count(self, frame: Frame, is_at_rest: bool) -> None:
+        """Take note of a frame; of one at rest also of the truth of the same moment."""
+        self._frames += 1
+        if is_at_rest:
+            wired, context = self._wired, self._context
+            self._seen = _Seen(
+                frame, wired.mask(context), wired.true_labels(context), wired.true_poses(context)
+            )
+
+    def close(self, interaction_step: int) -> Step:
+        """The step that ends with the last frame at rest; the count starts anew."""
+        assert self._seen is not None
+        frame, mask, ground_truth, poses = self._seen
         step = Step(
             interaction_step=interaction_step,
             time=frame.time,
             color=frame.color,
             depth=frame.depth,
             mask=mask,
-            frames=self.frames,
-            stage_seconds={stage: tuple(times) for stage, times in self.clock.seconds.items()},
+            frames=self._frames,
+            stage_seconds={stage: tuple(times) for stage, times in self._clock.seconds.items()},
             ground_truth=ground_truth,
             scores=score(mask, ground_truth),
-            motions=motion_between(self.poses, poses) if self.poses else {},
+            motions=motion_between(self._poses, poses) if self._poses else {},
         )
-        self.frames, self.poses = 0, poses
-        self.clock.seconds.clear()
+        self._frames, self._poses = 0, poses
+        self._clock.seconds.clear()
         return step

@@ -144,9 +144,7 @@ def stage_figures(seconds: Mapping[str, Sequence[float]]) -> dict[str, dict[str,
     }
 
 
-def motion_between(
-    before: Mapping[str, NDArray], after: Mapping[str, NDArray]
-) -> dict[str, ObjectMotion]:
+def motion_between(before: Mapping[str, NDArray], after: Mapping[str, NDArray]) -> dict[str, ObjectMotion]:
     """How far every object moved and tilted between two sets of poses X_WB [4, 4], by its name."""
     motions = {}
     for name, X_WB1 in after.items():

@@ -74,9 +74,7 @@ def _check_keys(node: yaml.Node, schema: Any, name: str, source: str, where: str
     fields = typing.get_type_hints(schema)
     known = [field.name for field in dataclasses.fields(schema)]
     if not isinstance(node, yaml.MappingNode):
-        raise ScenarioError(
-            f"{where} {name} must be a block of keys ({', '.join(known)}), not {_said(node)}"
-        )
+        raise ScenarioError(f"{where} {name} must be a block of keys ({', '.join(known)}), not {_said(node)}")
     for key_node, value_node in node.value:
         key = key_node.value
         path = key if name == "the scenario" else f"{name}.{key}"
@@ -86,6 +84,18 @@ def _check_keys(node: yaml.Node, schema: Any, name: str, source: str, where: str
             line = key_node.start_mark.line + 1
             raise ScenarioError(f"{source}: line {line}: unknown key {path!r}; {right}")
         _check(value_node, fields[key], path, source)
+        choices = _choices(schema, key)
+        if choices and value_node.value not in choices:
+            line = value_node.start_mark.line + 1
+            raise ScenarioError(
+                f"{source}: line {line}: {path} must be one of {', '.join(choices)}, not {_said(value_node)}"
+            )
+
+
+def _choices(schema: Any, key: str) -> tuple[str, ...]:
+    """The words that a field allows: `field(default=..., metadata={"choices": (...)})`; empty: any."""
+    (field,) = (field for field in dataclasses.fields(schema) if field.name == key)
+    return field.metadata.get("choices", ())
 
 
 def _without_none(schema: Any, node: yaml.Node) -> Any:

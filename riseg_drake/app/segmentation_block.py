@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, LeafSystem, OutputPort
 
 from riseg_drake.app.scenario import Scenario
-from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.robot.silhouette import RobotSilhouette
 from riseg_drake.segmentation.optical_flow import DisFlow
@@ -23,6 +22,14 @@ Less than a simulation step, so that the joint angles are those of the picture."
 MASK_OFFSET = 0.0015
 """L_t is made this long after the camera's tick, s: once the frame is in memory."""
 
+STATION_PORTS = {
+    "color_image": "wrist.color_image",
+    "depth_image": "wrist.depth_image",
+    "image_time": "wrist.image_time",
+    "position": "panda.position_measured",
+}
+"""The inputs of Alg. 2, and which outputs of a station belong there."""
+
 
 @dataclass(frozen=True)
 class SegmentationBlock:
@@ -30,20 +37,16 @@ class SegmentationBlock:
 
     stages: list[LeafSystem]
     inputs: dict[str, InputPort]
-    """`color_image`, `depth_image`, `image_time`, `position`, as a station gives them."""
+    """The keys of STATION_PORTS."""
     outputs: dict[str, OutputPort]
     """`pair`, `above_table`, `expected_flow`, `optical_flow`, `groups`, `mask`, `segmentation`."""
 
 
 def add_segmentation(
-    builder: DiagramBuilder,
-    scenario: Scenario,
-    intrinsics: Intrinsics,
-    kinematics: PandaKinematics,
-    period: float,
-    seed: int,
+    builder: DiagramBuilder, scenario: Scenario, kinematics: PandaKinematics, seed: int
 ) -> SegmentationBlock:
-    """Add Alg. 2 to a builder, for a camera that gives a frame every `period` seconds."""
+    """Add Alg. 2 to a builder, for the camera that the scenario describes."""
+    intrinsics, period = scenario.station.camera.intrinsics, 1 / scenario.station.camera.rate
     silhouette = RobotSilhouette(kinematics, intrinsics)
     view = builder.AddSystem(FrameView(intrinsics, kinematics.X_WC, silhouette.mask))
     above = builder.AddSystem(ObjectsAboveTable(scenario.above_table))
@@ -79,20 +82,17 @@ def add_segmentation(
     }
     return SegmentationBlock(
         stages=[view, above, memory, expected, optical, grouper, propagator],
-        inputs={
-            name: view.GetInputPort(name)
-            for name in ("color_image", "depth_image", "image_time", "position")
-        },
+        inputs={name: view.GetInputPort(name) for name in STATION_PORTS},
         outputs={name: system.GetOutputPort(name) for name, system in outputs.items()},
     )
 
 
 def make_segmentation(
-    scenario: Scenario, intrinsics: Intrinsics, kinematics: PandaKinematics, period: float, seed: int
+    scenario: Scenario, kinematics: PandaKinematics, seed: int
 ) -> tuple[Diagram, list[LeafSystem]]:
     """Alg. 2 as a diagram of its own, its ports named as the block's; and its stages."""
     builder = DiagramBuilder()
-    block = add_segmentation(builder, scenario, intrinsics, kinematics, period, seed)
+    block = add_segmentation(builder, scenario, kinematics, seed)
     for name, input_port in block.inputs.items():
         builder.ExportInput(input_port, name)
     for name, output_port in block.outputs.items():

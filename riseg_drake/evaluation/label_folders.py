@@ -40,17 +40,13 @@ def read_labels(path: Path) -> NDArray[np.uint16]:
     if image is None:
         raise LabelFolderError(f"{path} is not a readable PNG image")
     if image.ndim != 2:
-        raise LabelFolderError(
-            f"{path} is a colour image; a label image has one channel of 8 or 16 bits"
-        )
+        raise LabelFolderError(f"{path} is a colour image; a label image has one channel of 8 or 16 bits")
     return image.astype(np.uint16)
 
 
 def _label_names(folder: Path) -> list[str]:
     if not folder.is_dir():
-        raise LabelFolderError(
-            f"{folder} is not a folder; give two folders of label PNGs with equal names"
-        )
+        raise LabelFolderError(f"{folder} is not a folder; give two folders of label PNGs with equal names")
     names = sorted(path.name for path in folder.iterdir() if path.suffix.lower() == ".png")
     if not names:
         raise LabelFolderError(f"{folder} holds no PNG image")

@@ -64,9 +64,7 @@ def score(prediction: NDArray, ground_truth: NDArray) -> Scores:
     check_labels(prediction, "prediction")
     check_labels(ground_truth, "ground truth")
     if prediction.shape != ground_truth.shape:
-        raise ValueError(
-            f"the prediction is {_size(prediction)}, the ground truth {_size(ground_truth)}"
-        )
+        raise ValueError(f"the prediction is {_size(prediction)}, the ground truth {_size(ground_truth)}")
 
     predicted = _objects(prediction)
     true = _objects(ground_truth)
@@ -113,9 +111,7 @@ def mean_scores(scores: Sequence[Scores]) -> Scores:
 def check_labels(labels: NDArray, name: str) -> None:
     """Raise ValueError unless `labels` is a label image: [H, W], integers from 0 up."""
     if labels.ndim != 2 or labels.size == 0:
-        raise ValueError(
-            f"the {name} is not a label image: its shape is {labels.shape}, not [height, width]"
-        )
+        raise ValueError(f"the {name} is not a label image: its shape is {labels.shape}, not [height, width]")
     if not np.issubdtype(labels.dtype, np.integer) or labels.min() < 0:
         raise ValueError(f"the {name} is not a label image: labels are integers from 0 up")
 

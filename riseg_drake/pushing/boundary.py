@@ -42,6 +42,7 @@ def boundary(
         return p_WB
     angle = np.arctan2(offset[:, 1], offset[:, 0])
     sector = np.floor((angle / (2 * np.pi) + 0.5) * parameters.directions).astype(int)
+    sector %= parameters.directions  # pi and -pi are one direction
     order = np.lexsort((-radius, sector))
     outermost = order[np.unique(sector[order], return_index=True)[1]]
     p_WB, outward = p_WB[outermost], offset[outermost] / radius[outermost, None]

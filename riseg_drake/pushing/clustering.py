@@ -100,9 +100,7 @@ def elbow(inertia: NDArray, threshold: float) -> int:
     """
     if len(inertia) < 3:
         return 1
-    relative = np.log(
-        np.maximum(inertia, 1e-12 * max(inertia[0], 1e-12)) * np.arange(1, len(inertia) + 1)
-    )
+    relative = np.log(np.maximum(inertia, 1e-12 * max(inertia[0], 1e-12)) * np.arange(1, len(inertia) + 1))
     bend = relative[:-2] - 2 * relative[1:-1] + relative[2:]
     sharpest = int(np.argmax(bend))
     return sharpest + 2 if bend[sharpest] > threshold else 1

@@ -25,8 +25,9 @@ class ClustersParameters:
     """Cluster each piece alone; False clusters all of objsToSegment at once, as the paper does."""
     neck: float = 0.006
     """Where a connection is narrower than this, m, it is cut."""
-    compact: float = 0.92
-    """A piece that fills this share of its convex hull is one cluster: things that touch leave gaps."""
+    concavity: float = 0.008
+    """A piece whose outline nowhere recedes more than this from its convex hull, m, is one cluster:
+    where things touch, there mostly is a nook."""
     clustering: ClusteringParameters = field(default_factory=ClusteringParameters)
 
 
@@ -53,7 +54,7 @@ def find_clusters(
             table.points(piece),
             parameters.clustering,
             rng,
-            one_first=parameters.by_piece and solidity(piece) >= parameters.compact,
+            one_first=parameters.by_piece and concavity(piece, table.cell) <= parameters.concavity,
         )
         for piece in pieces
     ]
@@ -80,20 +81,21 @@ def split_at_necks(mask: NDArray[np.bool_], table: TableMap, neck: float) -> lis
     if amount <= 1:
         return [mask] if mask.any() else []
     # Every cell to the nearest core: distanceTransform numbers the cells of cores, not the cores.
-    _, nearest = cv2.distanceTransformWithLabels(
-        1 - cores, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-    )
+    _, nearest = cv2.distanceTransformWithLabels(1 - cores, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
     piece_of_label = np.zeros(nearest.max() + 1, int)
     piece_of_label[nearest[cores > 0]] = core_of[cores > 0]
     piece = np.where(mask, piece_of_label[nearest], 0)
     return [piece == number for number in range(1, amount) if (piece == number).any()]
 
 
-def solidity(piece: NDArray[np.bool_]) -> float:
-    """Area of a piece without its holes over that of its convex hull: 1 for a convex one."""
+def concavity(piece: NDArray[np.bool_], cell: float) -> float:
+    """How far a piece's outline recedes from its convex hull, m; 0 for a convex one. Holes do not count."""
     outlines, _ = cv2.findContours(piece.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-    hull = cv2.contourArea(cv2.convexHull(np.concatenate(outlines)))
-    return sum(cv2.contourArea(outline) for outline in outlines) / hull if hull > 0 else 1.0
+    filled, hull = np.zeros((2, *piece.shape), np.uint8)
+    cv2.drawContours(filled, outlines, -1, 1, cv2.FILLED)
+    cv2.fillConvexPoly(hull, cv2.convexHull(np.concatenate(outlines)), 1)
+    missing = (hull > 0) & (filled == 0)
+    return cell * float(cv2.distanceTransform(hull, cv2.DIST_L2, 5)[missing].max(initial=0.0))
 
 
 def _cells(mask: NDArray[np.bool_], chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -54,9 +54,7 @@ def find_contacts(
     lowest_object = pusher.lowest_tip_height / pusher.height_share
     reach = max(pusher.width, parameters.d_push)
     along = np.arange(-reach, reach, table.cell)
-    across = np.linspace(
-        -pusher.width / 2, pusher.width / 2, int(np.ceil(pusher.width / table.cell)) + 1
-    )
+    across = np.linspace(-pusher.width / 2, pusher.width / 2, int(np.ceil(pusher.width / table.cell)) + 1)
     swath = rectangle(boundary_W, direction_W, along, across)
     height = np.where(table.lookup(cluster, swath), table.lookup(table.height, swath), 0.0)
     profile = height.max(axis=2)  # [N, S]

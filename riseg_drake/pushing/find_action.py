@@ -64,9 +64,7 @@ def find_action(
         pushes: list[Push] = []
         for cluster in clusters:  # line 8
             B = boundary(cluster.cells, cluster.center_W, table, parameters.boundary)  # line 7
-            pushes += valid_pushes(
-                B, cluster, table, largest, tried, heading_W, parameters
-            )  # lines 9, 10
+            pushes += valid_pushes(B, cluster, table, largest, tried, heading_W, parameters)  # lines 9, 10
         pushes.sort(key=lambda push: push.cost)
         for push in pushes[: parameters.paths]:
             if plan_path is None:

@@ -27,6 +27,8 @@ class PushPathParameters:
     """The tip gathers and loses that speed in this time, s."""
     crossing_height: float = 0.02
     """Room below the tip when it crosses above the tallest object, m."""
+    longest: float = 9.0
+    """A path that would take longer than this, s, is no path: the arm has to wind itself around."""
     arm_room: float = 0.05
     """Objects must stay this much below the flange while the tip is down, m."""
     limits: SpeedLimits = field(default_factory=SpeedLimits)
@@ -81,70 +83,93 @@ def plan_push_path(
     if push.tallest > pusher.length - parameters.arm_room:
         return None
     ahead_W = np.append(push.direction_W, 0.0)
+    yaw = float(np.arctan2(push.direction_W[1], push.direction_W[0]))
     ground = push.p_WE[2] - push.tip_height
     crossing = max(ground + push.tallest + parameters.crossing_height, push.p_WE[2])
     above_W = np.append(push.p_WE[:2], crossing)
-    X_WE = kinematics.X_WE(q_observe)
-    observe_W, observe_yaw = X_WE[:3, 3], float(np.arctan2(X_WE[1, 0], X_WE[0, 0]))
-    yaw = float(np.arctan2(push.direction_W[1], push.direction_W[0]))
 
-    for turn in _turns(yaw - observe_yaw):
-        legs = []
-        q = np.asarray(q_observe, float)
-        if observe_W[2] < crossing:  # up first, where it stands
-            raised_W = np.append(observe_W[:2], crossing)
-            legs.append(_Leg(observe_W, raised_W, observe_yaw, observe_yaw))
-            legs.append(_Leg(raised_W, above_W, observe_yaw, observe_yaw + turn))
-        else:
-            legs.append(_Leg(observe_W, above_W, observe_yaw, observe_yaw + turn))
-        legs.append(_Leg(above_W, push.p_WE, yaw, yaw))
-        legs.append(_Leg(push.p_WE, push.p_WE + push.length * ahead_W, yaw, yaw))
-        traced = []
-        for leg in legs:
-            waypoints = leg.trace(q, kinematics, parameters)
-            if waypoints is None:
-                break
-            traced.append(waypoints)
-            q = waypoints[-1]
-        else:
-            return _in_time(traced, push.length, parameters)
-    return None
+    reached_W = push.p_WE + push.length * ahead_W
+    # From the push outwards: the posture for it is chosen first, the rest has to lead there.
+    q_start = kinematics.solve_ik(tip_pointing_down(push.p_WE, yaw), q_observe)
+    if q_start is None:
+        return None
+    stroke = _trace(_straight(push.p_WE, reached_W, yaw, yaw, parameters), q_start, kinematics)
+    climb = _trace(_straight(push.p_WE, above_W, yaw, yaw, parameters), q_start, kinematics)
+    if stroke is None or climb is None:
+        return None
+    legs = _crossing(q_observe, climb[-1], crossing, kinematics, parameters)
+    if legs is None:
+        return None
+    path = _in_time([*legs, climb[::-1], stroke], push.length, parameters)
+    return path if path.duration <= parameters.longest else None
 
 
-@dataclass(frozen=True)
-class _Leg:
-    """A straight piece of the tip's way, with the tool upright."""
-
-    from_W: NDArray[np.float64]
-    to_W: NDArray[np.float64]
-    from_yaw: float
-    to_yaw: float
-
-    def trace(
-        self, q_from: NDArray, kinematics: PandaKinematics, parameters: PushPathParameters
-    ) -> NDArray[np.float64] | None:
-        """Joint angles [N, 7] along it, the first q_from; None where the arm cannot follow."""
-        steps = max(
-            float(np.linalg.norm(self.to_W - self.from_W)) / parameters.position_step,
-            abs(self.to_yaw - self.from_yaw) / parameters.angle_step,
-            3,
-        )
-        shares = np.linspace(0, 1, int(np.ceil(steps)) + 1)[1:]
-        poses = [
-            tip_pointing_down(
-                self.from_W + share * (self.to_W - self.from_W),
-                self.from_yaw + share * (self.to_yaw - self.from_yaw),
-            )
-            for share in shares
-        ]
-        traced = kinematics.trace_ik(poses, q_from)
-        return None if traced is None else np.vstack([q_from, *traced])
+def _crossing(
+    q_observe: NDArray,
+    q_above: NDArray,
+    height: float,
+    kinematics: PandaKinematics,
+    parameters: PushPathParameters,
+) -> list[NDArray[np.float64]] | None:
+    """Joint angles [N, 7] of the legs from the observation posture to above the push, tip at `height`
+    or higher; None where the arm cannot follow.
+    """
+    q_from, legs = np.asarray(q_observe, float), []
+    p_WE, yaw = _tip(kinematics, q_from)
+    if p_WE[2] < height:  # up first, where it stands
+        raised_W = np.append(p_WE[:2], height)
+        rise = _trace(_straight(p_WE, raised_W, yaw, yaw, parameters), q_from, kinematics)
+        if rise is None:
+            return None
+        legs.append(rise)
+        q_from, p_WE = rise[-1], raised_W
+    # The same direction can be reached turning left or right; the joints' own way there tells which.
+    way = q_from + np.linspace(0, 1, 13)[:, None] * (q_above - q_from)
+    turn = float(np.diff(np.unwrap([_tip(kinematics, q)[1] for q in way])).sum())
+    above_W, _ = _tip(kinematics, q_above)
+    poses = _straight(p_WE, above_W, yaw, yaw + turn, parameters)
+    crossing = _trace(poses, q_from, kinematics, q_to=q_above)
+    return None if crossing is None else [*legs, crossing]
 
 
-def _turns(angle: float) -> list[float]:
-    """The same rotation, the short way and the long way round."""
-    short = float(np.arctan2(np.sin(angle), np.cos(angle)))
-    return [short, short - np.copysign(2 * np.pi, short)]
+def _straight(
+    from_W: NDArray, to_W: NDArray, from_yaw: float, to_yaw: float, parameters: PushPathParameters
+) -> list[NDArray[np.float64]]:
+    """Poses X_WE on a straight way with the tool upright, without the first."""
+    steps = max(
+        float(np.linalg.norm(to_W - from_W)) / parameters.position_step,
+        abs(to_yaw - from_yaw) / parameters.angle_step,
+        3,
+    )
+    shares = np.linspace(0, 1, int(np.ceil(steps)) + 1)[1:]
+    return [
+        tip_pointing_down(from_W + share * (to_W - from_W), from_yaw + share * (to_yaw - from_yaw))
+        for share in shares
+    ]
+
+
+def _trace(
+    poses: list[NDArray], q_from: NDArray, kinematics: PandaKinematics, q_to: NDArray | None = None
+) -> NDArray[np.float64] | None:
+    """Joint angles [N, 7] along poses, the first q_from; None where the arm cannot follow.
+
+    The seventh joint leaves a freedom. With q_to, the posture to reach at the last pose, each step sets
+    out from a point on the straight line there in joint space; so the freedom is used to get there.
+    """
+    traced = [q_from]
+    for left, pose in zip(range(len(poses), 0, -1), poses, strict=True):
+        guess = traced[-1] if q_to is None else traced[-1] + (q_to - traced[-1]) / left
+        q = kinematics.trace_ik([pose], guess)
+        if q is None:
+            return None
+        traced += q
+    return np.array(traced)
+
+
+def _tip(kinematics: PandaKinematics, q: NDArray) -> tuple[NDArray[np.float64], float]:
+    """p_WE [3] and the yaw of E's x axis at q [7]."""
+    X_WE = kinematics.X_WE(q)
+    return X_WE[:3, 3], float(np.arctan2(X_WE[1, 0], X_WE[0, 0]))
 
 
 def _in_time(legs: list[NDArray], length: float, parameters: PushPathParameters) -> PushPath:

@@ -105,9 +105,7 @@ def map_table(
     valid = depth > 0 if robot is None else (depth > 0) & ~robot
     pixels = np.flatnonzero(valid)
     if len(pixels):
-        pixel_size = (
-            1.5 * float(np.median(depth.reshape(-1)[pixels])) / min(intrinsics.fx, intrinsics.fy)
-        )
+        pixel_size = 1.5 * float(np.median(depth.reshape(-1)[pixels])) / min(intrinsics.fx, intrinsics.fy)
     else:
         pixel_size = 0.0
     cell = max(parameters.cell, pixel_size)

@@ -98,9 +98,6 @@ def rest_to_rest(
     knots = max(int(np.ceil(duration / KNOT_INTERVAL)), 4)
     tau = np.linspace(0, 1, knots + 1)
     rest = np.zeros((waypoints.shape[1], 1))
-    return PiecewisePolynomial.CubicWithContinuousSecondDerivatives(  # type: ignore[arg-type]
-        tau * max(duration, 1e-3),
-        path(profile(tau)[0]).T,
-        rest,
-        rest,  # type: ignore[arg-type]
+    return PiecewisePolynomial.CubicWithContinuousSecondDerivatives(
+        tau * max(duration, 1e-3), path(profile(tau)[0]).T, rest, rest
     )

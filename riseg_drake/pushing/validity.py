@@ -89,9 +89,7 @@ def accessible(
     behind b along cb.
     """
     margin = pusher.margin
-    along = _steps(
-        -clearance - pusher.thickness - margin, -clearance + min(margin, clearance / 2), table
-    )
+    along = _steps(-clearance - pusher.thickness - margin, -clearance + min(margin, clearance / 2), table)
     across = _steps(-pusher.width / 2 - margin, pusher.width / 2 + margin, table)
     area = rectangle(b_W, direction_W, along, across)
     occupied: NDArray[np.bool_] = np.any(table.lookup(table.objects, area), axis=(1, 2))
@@ -110,9 +108,7 @@ def overlap_after_push(
     return table.lookup(others, moved).mean(axis=1)
 
 
-def rectangle(
-    p_W: NDArray, direction_W: NDArray, along: NDArray, across: NDArray
-) -> NDArray[np.float64]:
+def rectangle(p_W: NDArray, direction_W: NDArray, along: NDArray, across: NDArray) -> NDArray[np.float64]:
     """Points [N, S, T, 2] of a grid around each of N points: `along` [S] its direction, `across` [T]."""
     left_W = np.stack([-direction_W[:, 1], direction_W[:, 0]], axis=1)
     return (

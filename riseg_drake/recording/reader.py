@@ -25,9 +25,7 @@ class RecordingReader:
 
     def __init__(self, folder: Path, stamp_limit: float = STAMP_LIMIT):
         if not folder.is_dir():
-            raise RecordingError(
-                f"{folder} is not a folder; a recording is one that holds {layout.COLOR_LIST}"
-            )
+            raise RecordingError(f"{folder} is not a folder; a recording is one that holds {layout.COLOR_LIST}")
         self.folder = folder
         self.intrinsics, self._depth_scale = _read_camera(folder / layout.CAMERA_FILE)
         color = _read_file_list(folder / layout.COLOR_LIST)
@@ -139,9 +137,7 @@ def _read_numbers(path: Path, columns: int, separator: str | None = None) -> NDA
     rows = []
     for number, cells in _lines(path, separator):
         if len(cells) != columns:
-            raise RecordingError(
-                f"{path}: line {number} must hold {columns} numbers, it holds {len(cells)}"
-            )
+            raise RecordingError(f"{path}: line {number} must hold {columns} numbers, it holds {len(cells)}")
         rows.append([_number(cell, path, number) for cell in cells])
     return np.array(rows, float).reshape(-1, columns)
 

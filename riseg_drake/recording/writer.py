@@ -25,9 +25,7 @@ class RecordingWriter:
 
     def __init__(self, folder: Path, intrinsics: Intrinsics):
         if (folder / layout.COLOR_LIST).exists():
-            raise RecordingError(
-                f"{folder} holds a recording already; give another folder or move it away"
-            )
+            raise RecordingError(f"{folder} holds a recording already; give another folder or move it away")
         self.folder = folder
         self.frames = 0
         """How many frames were written."""
@@ -39,10 +37,7 @@ class RecordingWriter:
 
     def append(self, frame: RecordedFrame) -> None:
         """Write one frame. Raises RecordingError if its images have another size than the camera's."""
-        if (
-            frame.color.shape[:2] != self._intrinsics.shape
-            or frame.depth.shape != self._intrinsics.shape
-        ):
+        if frame.color.shape[:2] != self._intrinsics.shape or frame.depth.shape != self._intrinsics.shape:
             raise RecordingError(
                 f"{self.folder}: the camera has {self._intrinsics.shape} pixels [v, u], frame "
                 f"{self.frames} has {frame.color.shape[:2]} in colour and {frame.depth.shape} in depth"

@@ -85,6 +85,7 @@ class ArmMotion(LeafSystem):
 
     def __init__(self, q_observe: NDArray, parameters: ArmMotionParameters | None = None):
         super().__init__()
+        self.set_name("ArmMotion")
         self._q_observe = np.array(q_observe, float)
         self._parameters = parameters or ArmMotionParameters()
         anything = Value[object](None)
@@ -182,9 +183,7 @@ class ArmMotion(LeafSystem):
         assert memory.push.path is not None
         if time < memory.start_time + memory.push.path.duration:
             return memory
-        return replace(
-            memory, interaction_step=memory.interaction_step + 1, unjudged=memory.push, push=None
-        )
+        return replace(memory, interaction_step=memory.interaction_step + 1, unjudged=memory.push, push=None)
 
     def _judge(self, memory: _Memory, pair: FramePair, context: Context) -> _Memory:
         """Remember what the last push brought."""
@@ -207,7 +206,7 @@ class ArmMotion(LeafSystem):
         offset = self._q_observe - push.path.position(0.0)
         if np.abs(offset).max() > self._parameters.largest_jump:
             raise ValueError(
-                f"the push's path begins {np.abs(offset).max():.3f} rad away from the observation posture, at "
-                f"most {self._parameters.largest_jump} is allowed; plan from the commanded position"
+                f"the push's path begins {np.abs(offset).max():.3f} rad away from the observation "
+                f"posture, at most {self._parameters.largest_jump} is allowed; plan from `position`"
             )
         return offset

@@ -5,8 +5,9 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import Context, LeafSystem
 
 from riseg_drake.geometry.rgbd import FramePair
-from riseg_drake.pushing.plan_push import PushPlanningParameters, plan_push
+from riseg_drake.pushing.push_planning import PushPlanningParameters, plan_push
 from riseg_drake.robot.kinematics import PandaKinematics
+from riseg_drake.systems.stage_clock import timed
 
 
 class PushPlanner(LeafSystem):
@@ -21,7 +22,8 @@ class PushPlanner(LeafSystem):
         tried_pushes: sequence of TriedPush; may be left unconnected.
 
     Output:
-        push: Push with its path, or None when everything is segmented or no valid push exists.
+        push: Push with its path, or None when everything is segmented, no valid push exists, or no
+            frame has come yet.
 
     The same inputs give the same push: the clustering's random numbers come from the seed and the
     frame's sequence number.
@@ -34,6 +36,7 @@ class PushPlanner(LeafSystem):
         seed: int = 0,
     ):
         super().__init__()
+        self.set_name("PushPlanner")
         self._kinematics = kinematics
         self._parameters = parameters or PushPlanningParameters()
         self._seed = seed
@@ -50,8 +53,12 @@ class PushPlanner(LeafSystem):
             prerequisites_of_calc={self.all_input_ports_ticket()},
         )
 
+    @timed
     def _calc_push(self, context: Context, output: AbstractValue) -> None:
-        pair: FramePair = self._pair.Eval(context)
+        pair: FramePair | None = self._pair.Eval(context)
+        if pair is None:
+            output.set_value(None)
+            return
         above_table = self._above_table.Eval(context)
         frame = pair.current
         push = plan_push(

@@ -38,7 +38,7 @@ class StageClock:
     def watch(self, systems: Iterable[System]) -> None:
         """Time the marked methods of these systems from now on."""
         for system in systems:
-            system._stage_clock = self  # type: ignore[attr-defined]
+            system._stage_clock = self
 
     def measure(self, stage: str, work: Callable[[], Any]) -> Any:
         """Do the work, book its time under the stage's name, return what the work returned."""

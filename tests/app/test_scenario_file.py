@@ -18,6 +18,7 @@ class Scene:
     name: str = "built-in"
     centre: list[float] = field(default_factory=lambda: [0.5, 0.0])
     limit: float | None = None
+    method: str = field(default="fast", metadata={"choices": ("fast", "careful")})
 
 
 def parse(text):
@@ -50,6 +51,7 @@ def test_an_empty_file_is_all_defaults(text):
         ("centre: 3", "scene.yaml: line 1: centre must be a list, such as [1, 2], not '3'"),
         ("centre: [1, x]", "scene.yaml: line 1: centre[1] must be a number, not 'x'"),
         ("camera: 3", "scene.yaml: line 1: camera must be a block of keys (rate, noise), not '3'"),
+        ("method: quick", "scene.yaml: line 1: method must be one of fast, careful, not 'quick'"),
         ("- 1", "scene.yaml: line 1: the scenario must be a block of keys"),
         ("a: [1", "scene.yaml: line 1: not YAML"),
     ],

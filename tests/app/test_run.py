@@ -1,0 +1,118 @@
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from riseg_drake.app import bench
+from riseg_drake.app import run as run_module
+from riseg_drake.app.cli import main
+from riseg_drake.evaluation.scores import score
+from riseg_drake.recording.reader import RecordingReader
+from riseg_drake.robot.kinematics import PandaKinematics
+
+pytestmark = pytest.mark.renders
+STAGES = ("FrameView", "ObjectsAboveTable", "ExpectedFlow", "OpticalFlow", "BFIFGrouper", "MaskPropagator")
+
+
+@pytest.fixture(scope="module")
+def finished(small_scenario, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("finished")
+    assert main(["run", str(small_scenario), "--seed", "1", "--record", "--output", str(folder)]) == 0
+    return folder
+
+
+def summary(folder):
+    return json.loads((folder / "summary.json").read_text())
+
+
+def read(path):
+    return cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+
+
+def test_a_run_ends_by_itself_and_leaves_a_step_for_every_interaction(finished):
+    content = summary(finished)
+    assert content["state"] == "done"
+    assert content["seed"] == 1
+    assert [step["step"] for step in content["steps"]] == [0, 1]
+    for i in (0, 1):
+        names = {path.name for path in (finished / f"step_{i}").iterdir()}
+        assert names == {"color.png", "depth.png", "mask.png", "overlay.png", "ground_truth.png"}
+
+
+def test_before_the_first_push_the_mask_is_empty(finished):
+    assert not read(finished / "step_0" / "mask.png").any()
+
+
+def test_an_interaction_moves_an_object_and_its_mask_appears(finished):
+    step = summary(finished)["steps"][1]
+    assert max(motion["moved_m"] for motion in step["motions"].values()) > 0.005
+    assert read(finished / "step_1" / "mask.png").any()
+
+
+def test_the_scores_of_the_summary_are_those_of_the_written_images(finished):
+    for entry in summary(finished)["steps"]:
+        folder = finished / f"step_{entry['step']}"
+        written = score(read(folder / "mask.png"), read(folder / "ground_truth.png"))
+        assert entry["scores"] == pytest.approx(written.as_dict())
+
+
+def test_every_stage_is_evaluated_once_a_frame(finished):
+    for step in summary(finished)["steps"]:
+        assert {stage: step["stages"][stage]["calls"] for stage in STAGES} == dict.fromkeys(
+            STAGES, step["frames"]
+        )
+
+
+def test_the_recording_holds_every_frame_with_the_joint_angles_of_its_picture(finished):
+    reader = RecordingReader(finished / "recording")
+    kinematics = PandaKinematics()
+    frames = list(reader)
+    assert len(frames) == summary(finished)["frames"]
+    for frame in frames:
+        np.testing.assert_allclose(kinematics.X_WC(frame.position), frame.X_WC, rtol=0, atol=1e-12)
+    assert max(frame.labels.max() for frame in frames) == 2
+
+
+def test_the_last_step_shows_what_the_recording_saw_at_its_time(finished):
+    step = summary(finished)["steps"][1]
+    (frame,) = [f for f in RecordingReader(finished / "recording") if abs(f.time - step["time_s"]) < 1e-5]
+    np.testing.assert_array_equal(read(finished / "step_1" / "color.png")[..., ::-1], frame.color)
+    np.testing.assert_array_equal(read(finished / "step_1" / "ground_truth.png"), frame.labels)
+
+
+def test_a_run_that_is_stopped_leaves_whole_steps_and_exit_code_130(
+    small_scenario, tmp_path, monkeypatch, capsys
+):
+    # Ctrl-C at the 20th frame: after step 0, before step 1.
+    seen = []
+
+    def stop(self, progress):
+        seen.append(progress.frames)
+        if progress.frames == 20:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(run_module.Narrator, "follow", stop)
+    assert main(["run", str(small_scenario), "--record", "--output", str(tmp_path / "out")]) == 130
+    content = summary(tmp_path / "out")
+    assert content["state"] == "interrupted"
+    assert [step["step"] for step in content["steps"]] == [0]
+    assert not list((tmp_path / "out").rglob("*.unfinished"))
+    assert len(list(RecordingReader(tmp_path / "out" / "recording"))) in (19, 20)
+    error = capsys.readouterr().err
+    assert error == f"riseg: stopped; 1 finished step in {tmp_path / 'out'}\n"
+
+
+def test_the_same_seed_gives_the_same_bytes(finished, small_scenario, tmp_path):
+    assert main(["run", str(small_scenario), "--seed", "1", "--output", str(tmp_path / "again")]) == 0
+    for name in ("color.png", "depth.png", "mask.png", "ground_truth.png"):
+        again = tmp_path / "again" / "step_1" / name
+        assert again.read_bytes() == (finished / "step_1" / name).read_bytes(), name
+
+
+def test_the_bench_measures_every_stage(small_scenario, capsys, monkeypatch):
+    monkeypatch.setattr(bench, "REPETITIONS", 1)
+    assert main(["bench", str(small_scenario), "--seed", "1"]) == 0
+    printed = capsys.readouterr().out
+    rows = {line.split()[0] for line in printed.splitlines() if line.strip()}
+    assert rows >= {*STAGES, "whole"}

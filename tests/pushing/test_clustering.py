@@ -1,0 +1,69 @@
+import numpy as np
+import pytest
+
+from riseg_drake.pushing.clustering import METHODS, ClusteringParameters, clusterings, elbow
+
+PLACES = np.array([[0.4, -0.1], [0.6, -0.1], [0.4, 0.1], [0.6, 0.1], [0.5, 0.0], [0.7, 0.0]])
+
+
+def blobs(k, rng, radius=0.02, points=400):
+    """Discs of points around the first k places."""
+    r, angle = radius * np.sqrt(rng.random((k, points))), 2 * np.pi * rng.random((k, points))
+    offset = np.stack([r * np.cos(angle), r * np.sin(angle)], axis=-1)
+    return (PLACES[:k, None] + offset).reshape(-1, 2)
+
+
+@pytest.mark.parametrize("method", ["k-means", "k-medoids"])
+@pytest.mark.parametrize("k", [1, 2, 3, 4, 5, 6])
+def test_elbow_finds_the_number_of_drawn_blobs(k, method):
+    rng = np.random.default_rng(0)
+    clustering = next(clusterings(blobs(k, rng), ClusteringParameters(method=method), rng))
+    assert len(clustering.centers) == k
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_each_method_puts_a_center_into_each_blob(method):
+    rng = np.random.default_rng(0)
+    clustering = next(clusterings(blobs(4, rng), ClusteringParameters(method=method), rng))
+    distance = np.linalg.norm(PLACES[:4, None] - clustering.centers, axis=-1)
+    assert distance.shape == (4, 4)
+    assert (distance.min(axis=1) < 0.005).all()
+    assert (np.bincount(clustering.labels) == 400).all()
+
+
+def test_medoids_are_points_themselves():
+    rng = np.random.default_rng(0)
+    points = blobs(3, rng)
+    centers = next(clusterings(points, ClusteringParameters(method="k-medoids"), rng)).centers
+    assert all((points == center).all(axis=1).any() for center in centers)
+
+
+def test_further_clusterings_are_ever_finer():
+    rng = np.random.default_rng(0)
+    k = [len(c.centers) for c in clusterings(blobs(2, rng), ClusteringParameters(finer=3), rng)]
+    assert k == [2, 3, 4, 5]
+
+
+def test_curve_without_a_bend_is_one_cluster():
+    assert elbow(1.0 / np.arange(1, 9), 0.25) == 1
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_same_seed_gives_the_same_clusters(method):
+    points = blobs(5, np.random.default_rng(0), points=900)
+    first, second = (
+        next(clusterings(points, ClusteringParameters(method=method), np.random.default_rng(3)))
+        for _ in range(2)
+    )
+    assert np.array_equal(first.centers, second.centers)
+    assert np.array_equal(first.labels, second.labels)
+
+
+def test_single_point_is_a_cluster():
+    (clustering,) = clusterings(np.zeros((1, 2)), ClusteringParameters(), np.random.default_rng(0))
+    assert clustering.centers.tolist() == [[0.0, 0.0]]
+
+
+def test_unknown_method_is_an_error_that_names_the_known_ones():
+    with pytest.raises(ValueError, match="k-medoids"):
+        next(clusterings(np.zeros((1, 2)), ClusteringParameters(method="x"), np.random.default_rng(0)))

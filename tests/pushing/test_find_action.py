@@ -1,0 +1,122 @@
+import numpy as np
+import pytest
+
+from riseg_drake.pushing.find_action import FindActionParameters, find_action
+from riseg_drake.pushing.tried_pushes import TriedPush
+
+
+def act(table, seed=0, **options):
+    return find_action(table, np.random.default_rng(seed), **options)
+
+
+def cluttered(drawn):
+    drawn.box(0.45, 0.0, 0.06, 0.04, yaw=0.3).disc(0.5, 0.05, 0.02, height=0.02)
+    return drawn.box(0.52, -0.02, 0.05, 0.05, yaw=0.8).disc(0.45, -0.08, 0.03)
+
+
+def test_segmented_scene_is_null(drawn):
+    table = drawn.box(0.5, 0.0, 0.05, 0.05, segmented=True).map()
+    assert act(table) is None
+
+
+def test_empty_table_is_null(drawn):
+    assert act(drawn.map()) is None
+
+
+def test_boxed_in_object_is_null(drawn):
+    drawn.box(0.5, 0.0, 0.13, 0.13, segmented=True)
+    drawn.put((np.abs(drawn.centres() - [0.5, 0.0]) <= 0.05).all(-1), 0.05, False)
+    drawn.objects[(np.abs(drawn.centres() - [0.5, 0.0]) <= 0.045).all(-1)] = False
+    drawn.box(0.5, 0.0, 0.04, 0.04)  # 2.5 cm of room all around: too little for the bar
+    drawn.segmented[(np.abs(drawn.centres() - [0.5, 0.0]) > 0.03).any(-1)] = True
+    assert act(drawn.map()) is None
+
+
+def test_push_goes_through_the_center_of_a_lone_object(drawn):
+    push = act(drawn.box(0.5, 0.05, 0.05, 0.03, yaw=0.5).map())
+    offset = push.center_W - push.p_WE[:2]
+    assert np.linalg.det([offset, push.direction_W]) == pytest.approx(0.0, abs=1e-9)
+    assert push.center_W == pytest.approx([0.5, 0.05], abs=0.001)
+    assert offset @ push.direction_W > 0
+    assert np.linalg.norm(push.direction_W) == pytest.approx(1.0)
+
+
+def test_tip_starts_a_clearance_and_half_a_bar_behind_the_contact(drawn):
+    push = act(drawn.disc(0.5, 0.0, 0.03).map())
+    assert np.linalg.norm(push.p_WB[:2] - push.p_WE[:2]) == pytest.approx(0.01 + 0.01)
+    assert push.length == pytest.approx(0.01 + 0.02)
+    assert np.linalg.norm(push.p_WB[:2] - push.center_W) == pytest.approx(0.03, abs=0.003)
+
+
+def test_object_is_not_pushed_into_its_neighbour(drawn):
+    drawn.box(0.5, 0.0, 0.04, 0.04)
+    push = act(drawn.box(0.5, 0.042, 0.1, 0.04, segmented=True).map())
+    assert push.center_W == pytest.approx([0.5, 0.0], abs=0.003)
+    assert push.direction_W[1] < 0.1
+
+
+def test_two_things_that_touch_are_pushed_across_their_contact(drawn):
+    push = act(drawn.disc(0.47, 0.0, 0.03).disc(0.53, 0.0, 0.03).map())
+    # The centers lie on x: a push along x would move both alike, one across x moves one of them.
+    assert abs(push.direction_W[0]) < 0.6 or (push.center_W[0] - 0.5) * push.direction_W[0] > 0
+
+
+def test_same_seed_gives_the_same_push(drawn):
+    table = cluttered(drawn).map()
+    first, second = act(table, seed=4), act(table, seed=4)
+    assert np.array_equal(first.p_WE, second.p_WE)
+    assert first.cost == second.cost
+
+
+def test_push_that_changed_nothing_is_not_repeated(drawn):
+    table = drawn.disc(0.5, 0.0, 0.03).map()
+    tried = []
+    for _ in range(3):
+        push = act(table, tried=tried)
+        for earlier in tried:
+            far = np.linalg.norm(push.p_WB[:2] - earlier.p_WB[:2]) > 0.015
+            assert far or push.direction_W @ earlier.direction_W < np.cos(0.5)
+        tried.append(TriedPush(push.p_WB, push.direction_W, changed=False))
+
+
+def test_nothing_is_driven_off_the_work_area(drawn):
+    drawn.work_area = (0.25, 0.75, -0.28, 0.28)
+    push = act(drawn.disc(0.72, 0.0, 0.028).map(), heading_W=np.array([1.0, 0.0]))
+    assert (push.cluster_W + push.d_push * push.direction_W)[:, 0].max() <= 0.75
+    inwards = act(drawn.disc(0.745, 0.2, 0.03).map())
+    assert inwards is not None
+
+
+def test_candidate_that_the_arm_cannot_do_is_passed_over(drawn):
+    asked = []
+
+    def plan_path(push):
+        asked.append(push)
+        return "a path" if len(asked) == 3 else None
+
+    push = act(drawn.disc(0.5, 0.0, 0.03).map(), plan_path=plan_path)
+    assert push.path == "a path"
+    assert push.direction_W is asked[2].direction_W
+    assert [p.cost for p in asked] == sorted(p.cost for p in asked)
+
+
+def test_without_any_reachable_candidate_the_action_is_null(drawn):
+    assert act(drawn.disc(0.5, 0.0, 0.03).map(), plan_path=lambda push: None) is None
+
+
+def test_ring_is_pushed_though_its_center_is_empty(drawn):
+    push = act(drawn.disc(0.5, 0.0, 0.05, hole=0.03).map())
+    assert push is not None
+    assert push.length == pytest.approx(0.03)
+
+
+def test_tall_narrow_thing_is_pushed_along_its_longer_side(drawn):
+    push = act(drawn.box(0.5, 0.0, 0.08, 0.02, height=0.12).map())
+    assert abs(push.direction_W[0]) > 0.9
+
+
+@pytest.mark.parametrize("method", ["k-means", "k-medoids", "mean-shift"])
+def test_each_clustering_method_leads_to_a_push(drawn, method):
+    parameters = FindActionParameters()
+    parameters.clusters.clustering.method = method
+    assert act(cluttered(drawn).map(), parameters=parameters) is not None

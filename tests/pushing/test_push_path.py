@@ -1,0 +1,148 @@
+"""The arm's path of one push, by the arm's own forward kinematics."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from riseg_drake.pushing.find_action import find_action
+from riseg_drake.pushing.push import ArmPhase
+from riseg_drake.pushing.push_path import PushPathParameters, plan_push_path
+from riseg_drake.pushing.pusher import Pusher
+from riseg_drake.robot.kinematics import observe_pose
+from riseg_drake.robot.limits import PANDA_LIMITS
+
+
+@pytest.fixture(scope="module")
+def q_observe(panda):
+    return panda.solve_ik(observe_pose([0.5, 0.0, 0.0], 0.5, panda.X_EC))
+
+
+def planned(drawn, panda, q_observe):
+    push = find_action(
+        drawn.map(),
+        np.random.default_rng(0),
+        plan_path=lambda push: plan_push_path(push, panda, q_observe, Pusher()),
+    )
+    assert push is not None
+    return push
+
+
+@pytest.fixture
+def push(drawn, panda, q_observe):
+    drawn.box(0.5, 0.08, 0.05, 0.04, yaw=0.5, height=0.015).box(0.42, 0.08, 0.03, 0.06)
+    return planned(drawn.box(0.56, 0.04, 0.03, 0.06), panda, q_observe)
+
+
+def samples(path, step=0.005):
+    return np.arange(0.0, path.duration, step)
+
+
+def test_path_stays_within_the_joints_limits_at_every_sample(push):
+    time = samples(push.path, 0.002)
+    q = push.path.trajectory.vector_values(time).T
+    assert (PANDA_LIMITS.room(q) >= 0.05 - 1e-3).all()
+    bounds = (PANDA_LIMITS.velocity, PANDA_LIMITS.acceleration, PANDA_LIMITS.jerk)
+    for order, bound in enumerate(bounds, 1):
+        rate = push.path.trajectory.MakeDerivative(order).vector_values(time)
+        assert (np.abs(rate).max(axis=1) <= 0.65 * bound).all()
+
+
+def test_velocity_and_acceleration_have_no_jumps(push):
+    time = samples(push.path, 0.001)
+    for order, largest in ((1, PANDA_LIMITS.acceleration), (2, PANDA_LIMITS.jerk)):
+        rate = push.path.trajectory.MakeDerivative(order).vector_values(time)
+        assert (np.abs(np.diff(rate)).max(axis=1) <= 0.001 * largest).all()
+
+
+def test_path_begins_and_ends_at_the_observation_posture(push, q_observe):
+    assert push.path.position(0.0) == pytest.approx(q_observe)
+    assert push.path.position(push.path.duration + 1.0) == pytest.approx(q_observe)
+
+
+def test_tip_keeps_to_the_line_of_the_push_at_the_speed_of_the_push(push, panda):
+    path, ahead_W = push.path, np.append(push.direction_W, 0.0)
+    travelled = []
+    for time in np.linspace(path.push_start, path.push_end, 60):
+        X_WE = panda.X_WE(path.position(time))
+        offset = X_WE[:3, 3] - push.p_WE
+        travelled.append(offset @ ahead_W)
+        assert np.linalg.norm(offset - travelled[-1] * ahead_W) < 5e-4
+        np.testing.assert_allclose(X_WE[:3, 0], ahead_W, atol=2e-3)
+        np.testing.assert_allclose(X_WE[:3, 2], [0, 0, -1], atol=2e-3)
+    assert travelled[0] == pytest.approx(0.0, abs=1e-5)
+    assert travelled[-1] == pytest.approx(0.01 + 0.02, abs=1e-5)
+    step = (path.push_end - path.push_start) / 59
+    assert np.diff(travelled).max() / step == pytest.approx(0.02, rel=0.03)
+
+
+def test_tip_never_comes_below_its_floor_and_crosses_above_everything(push, panda):
+    path = push.path
+    lowest = np.inf
+    for time in samples(path, 0.02):
+        X_WE = panda.X_WE(path.position(time))
+        lowest = min(lowest, X_WE[2, 3])
+        if np.linalg.norm(X_WE[:2, 3] - push.p_WE[:2]) > push.length + 1e-3:
+            assert X_WE[2, 3] >= push.tallest + 0.01
+    assert lowest == pytest.approx(push.tip_height, abs=2e-4)
+    assert lowest >= Pusher().lowest_tip_height - 2e-4
+
+
+def test_descent_is_straight_down(push, panda):
+    path = push.path
+    for time in samples(path, 0.02):
+        p_WE = panda.X_WE(path.position(time))[:3, 3]
+        if p_WE[2] < push.tallest + 0.005 and path.phase(time) is ArmPhase.APPROACH:
+            assert np.linalg.norm(p_WE[:2] - push.p_WE[:2]) < 5e-4
+
+
+def test_arm_keeps_clear_of_the_table_and_of_itself(push, panda):
+    for time in samples(push.path, 0.05):
+        assert panda.clearance(push.path.position(time)) >= 0.003
+
+
+def test_phases_follow_each_other(push):
+    phases = [push.path.phase(time) for time in samples(push.path)]
+    order = [ArmPhase.APPROACH, ArmPhase.PUSH, ArmPhase.RETREAT]
+    assert [p for p, before in zip(phases, [None, *phases], strict=False) if p != before] == order
+
+
+def test_tip_rises_first_where_the_observation_posture_is_lower_than_things(push, panda, q_observe):
+    tall = replace(push, tallest=0.16)
+    path = plan_push_path(tall, panda, q_observe, Pusher())
+    heights = [panda.X_WE(path.position(time)) for time in samples(path, 0.02)]
+    for X_WE in heights:
+        away = min(np.linalg.norm(X_WE[:2, 3] - p_W[:2]) for p_W in (push.p_WE, panda.X_WE(q_observe)[:3, 3]))
+        assert away < push.length + 1e-3 or X_WE[2, 3] > 0.17
+
+
+@pytest.mark.parametrize("x", [0.95, 0.05])
+def test_push_out_of_reach_has_no_path(push, panda, q_observe, x):
+    assert plan_push_path(replace(push, p_WE=np.array([x, 0.1, 0.008])), panda, q_observe, Pusher()) is None
+
+
+def test_things_as_tall_as_the_pusher_are_not_pushed(push, panda, q_observe):
+    assert plan_push_path(replace(push, tallest=0.27), panda, q_observe, Pusher()) is None
+
+
+def test_reaches_pushes_all_over_the_work_area(drawn, panda, q_observe):
+    # Pushes towards the robot are partly out of reach: the camera ahead would be in the forearm's place.
+    planned_count = 0
+    start = np.array([[0.38, -0.15], [0.38, 0.15], [0.62, -0.15], [0.62, 0.15], [0.5, 0.0]])
+    template = planned(drawn.disc(0.5, 0.0, 0.03), panda, q_observe)
+    for p_W in start:
+        for angle in np.arange(8) * np.pi / 4:
+            push = replace(
+                template,
+                p_WE=np.append(p_W, 0.008),
+                direction_W=np.array([np.cos(angle), np.sin(angle)]),
+            )
+            planned_count += plan_push_path(push, panda, q_observe, Pusher()) is not None
+    assert planned_count >= 28
+
+
+def test_slower_limits_take_longer(push, panda, q_observe):
+    slow = PushPathParameters()
+    slow.limits.velocity = 0.2
+    path = plan_push_path(push, panda, q_observe, Pusher(), slow)
+    assert path.duration > push.path.duration

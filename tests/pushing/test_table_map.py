@@ -1,0 +1,60 @@
+import numpy as np
+import pytest
+
+from riseg_drake.pushing.table_map import TableMapParameters, map_table
+
+FLAT = np.array([0.0, 0.0, 1.0, 0.0])
+
+
+def map_of(view, mask=None, robot=None, parameters=None):
+    mask = np.zeros_like(view.number) if mask is None else mask
+    return map_table(
+        view.depth, view.intrinsics, view.X_WC, view.objects, view.height, mask, FLAT, robot, parameters
+    )
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.25])
+@pytest.mark.parametrize("place", [(0.5, 0.0), (0.42, 0.12), (0.58, -0.1)])
+def test_outline_of_a_tall_box_is_its_true_one_wherever_the_camera_sees_it(view, place, tilt):
+    x, y = place
+    table = map_of(view([(x, y, 0.05, 0.03, 0.08)], tilt=tilt, x=0.5 - 0.5 * np.tan(tilt)))
+    P = table.points(table.objects)
+    np.testing.assert_allclose(P.min(axis=0), [x - 0.025, y - 0.015], atol=1.01 * table.cell)
+    np.testing.assert_allclose(P.max(axis=0), [x + 0.025, y + 0.015], atol=1.01 * table.cell)
+    assert table.objects.sum() * table.cell_area == pytest.approx(0.05 * 0.03, rel=0.12)
+    assert table.height.max() == pytest.approx(0.08, abs=1e-4)
+
+
+def test_cell_is_segmented_where_its_highest_point_has_an_id(view):
+    seen = view([(0.5, 0.05, 0.04, 0.04, 0.05), (0.5, -0.05, 0.04, 0.04, 0.05)])
+    table = map_of(seen, mask=np.where(seen.number == 2, 7, 0))
+    assert table.lookup(table.segmented, np.array([0.5, -0.05]))
+    assert not table.lookup(table.segmented, np.array([0.5, 0.05]))
+
+
+def test_what_a_box_hides_and_what_the_robot_covers_is_not_seen(view):
+    seen = view([(0.5, 0.1, 0.05, 0.05, 0.1)])
+    robot = np.zeros(seen.depth.shape, bool)
+    robot[-60:] = True
+    table = map_of(seen, robot=robot)
+    assert table.lookup(table.seen, np.array([0.5, 0.0]))
+    assert not table.lookup(table.seen, np.array([0.5, 0.135]))  # in the shadow
+    assert not table.lookup(table.seen, np.array([0.33, 0.0]))  # under the robot
+
+
+def test_lookup_outside_of_the_map_finds_nothing(drawn):
+    table = drawn.box(0.5, 0.0, 1.0, 1.0).map()
+    assert not table.lookup(table.objects, np.array([5.0, 0.0]))
+    assert table.lookup(table.height, np.array([-1.0, 0.0])) == 0.0
+
+
+def test_cells_are_no_finer_than_the_pixels(view):
+    table = map_of(view([], z=2.0), parameters=TableMapParameters(cell=0.001))
+    assert table.cell == pytest.approx(1.5 * 2.0 / 615.778, rel=1e-3)
+
+
+def test_ground_follows_a_sloped_table(view):
+    seen = view([])
+    slope = np.array([-0.1, 0.0, 1.0, -0.02]) / np.hypot(1, 0.1)
+    table = map_table(seen.depth, seen.intrinsics, seen.X_WC, seen.objects, seen.height, seen.number, slope)
+    assert table.ground(np.array([0.5, 0.3])) == pytest.approx(0.07)
