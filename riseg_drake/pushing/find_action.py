@@ -56,7 +56,7 @@ def find_action(
             as reachable and comes without a path.
     """
     parameters = parameters or FindActionParameters()
-    to_segment = objects_to_segment(table, parameters.to_segment)  # lines 2 and 3
+    to_segment = objects_to_segment(table, parameters.to_segment)  # line 3
     if not to_segment.any():  # line 4
         return None  # line 5
     for clusters in find_clusters(to_segment, table, parameters.clusters, rng):  # line 6

@@ -21,11 +21,6 @@ class ObjectsToSegmentParameters:
     towards the minimum area."""
 
 
-def binarize_mask(mask: NDArray) -> NDArray[np.bool_]:
-    """binL (eq. 3): where L_t holds an object id."""
-    return mask > 0
-
-
 def objects_to_segment(
     table: TableMap, parameters: ObjectsToSegmentParameters | None = None
 ) -> NDArray[np.bool_]:

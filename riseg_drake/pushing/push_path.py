@@ -14,7 +14,14 @@ from pydrake.trajectories import PiecewisePolynomial
 from riseg_drake.pushing.push import ArmPhase, Push
 from riseg_drake.pushing.pusher import Pusher
 from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest, steady_speed
-from riseg_drake.robot.kinematics import PandaKinematics, tip_pointing_down
+from riseg_drake.robot.kinematics import (
+    LIMIT_MARGIN,
+    MIN_CLEARANCE,
+    PandaKinematics,
+    pose_error,
+    tip_pointing_down,
+)
+from riseg_drake.robot.limits import PANDA_LIMITS
 
 
 @dataclass
@@ -37,6 +44,8 @@ class PushPathParameters:
     """Distance between poses at which the joint angles are solved for, m ..."""
     angle_step: float = 0.08
     """... and the angle between them, rad."""
+    joint_step: float = 0.25
+    """No joint may turn more than this between two of those poses, rad: beyond, it would be a leap."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +137,7 @@ def _crossing(
     turn = float(np.diff(np.unwrap([_tip(kinematics, q)[1] for q in way])).sum())
     above_W, _ = _tip(kinematics, q_above)
     poses = _straight(p_WE, above_W, yaw, yaw + turn, parameters)
-    crossing = _trace(poses, q_from, kinematics, q_to=q_above)
+    crossing = _lead(poses, q_from, q_above, kinematics, parameters)
     return None if crossing is None else [*legs, crossing]
 
 
@@ -148,22 +157,48 @@ def _straight(
     ]
 
 
-def _trace(
-    poses: list[NDArray], q_from: NDArray, kinematics: PandaKinematics, q_to: NDArray | None = None
-) -> NDArray[np.float64] | None:
-    """Joint angles [N, 7] along poses, the first q_from; None where the arm cannot follow.
+def _trace(poses: list[NDArray], q_from: NDArray, kinematics: PandaKinematics) -> NDArray[np.float64] | None:
+    """Joint angles [N, 7] along poses, the first q_from; None where the arm cannot follow."""
+    traced = kinematics.trace_ik(poses, q_from)
+    return None if traced is None else np.vstack([q_from, *traced])
 
-    The seventh joint leaves a freedom. With q_to, the posture to reach at the last pose, each step sets
-    out from a point on the straight line there in joint space; so the freedom is used to get there.
+
+def _lead(
+    poses: list[NDArray],
+    q_from: NDArray,
+    q_to: NDArray,
+    kinematics: PandaKinematics,
+    parameters: PushPathParameters,
+) -> NDArray[np.float64] | None:
+    """Joint angles [N, 7] along poses from q_from to q_to, which is at the last; None where there are none.
+
+    Seven joints leave one freedom, which is to lead to q_to: each step sets out from a point on the
+    straight line there in joint space, and moves from it to the pose by as little as it can.
     """
-    traced = [q_from]
+    led = [q_from]
     for left, pose in zip(range(len(poses), 0, -1), poses, strict=True):
-        guess = traced[-1] if q_to is None else traced[-1] + (q_to - traced[-1]) / left
-        q = kinematics.trace_ik([pose], guess)
-        if q is None:
+        q = _nearest_posture(pose, led[-1] + (q_to - led[-1]) / left, kinematics)
+        if (
+            q is None
+            or np.abs(q - led[-1]).max() > parameters.joint_step
+            or not PANDA_LIMITS.contains(q, LIMIT_MARGIN)
+            or kinematics.clearance(q) < MIN_CLEARANCE
+        ):
             return None
-        traced += q
-    return np.array(traced)
+        led.append(q)
+    return np.array(led)
+
+
+def _nearest_posture(X_WE: NDArray, q: NDArray, kinematics: PandaKinematics) -> NDArray[np.float64] | None:
+    """The posture [7] near q that has the tip at X_WE to 1 um and 1 urad, or None: Newton's method, each
+    step the shortest one.
+    """
+    for _ in range(15):
+        error = pose_error(kinematics.X_WE(q), X_WE)
+        if np.abs(error).max() < 1e-6:
+            return q
+        q = q + np.linalg.lstsq(kinematics.tip_jacobian(q), error, rcond=1e-4)[0]
+    return None
 
 
 def _tip(kinematics: PandaKinematics, q: NDArray) -> tuple[NDArray[np.float64], float]:

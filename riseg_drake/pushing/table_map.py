@@ -77,6 +77,11 @@ class TableMap:
         return (x >= x_min) & (x <= x_max) & (y >= y_min) & (y <= y_max)
 
 
+def binarize_mask(mask: NDArray) -> NDArray[np.bool_]:
+    """binL (eq. 3): where L_t holds an object id."""
+    return mask > 0
+
+
 def map_table(
     depth: NDArray,
     intrinsics: Intrinsics,
@@ -134,7 +139,7 @@ def map_table(
     occupied = np.zeros(rows * columns, bool)
     occupied[cells] = True
     segmented = np.zeros(rows * columns, bool)
-    segmented[cells] = mask.reshape(-1)[pixels] > 0
+    segmented[cells] = binarize_mask(mask).reshape(-1)[pixels]
     shape = (rows, columns)
     return TableMap(
         origin_W=origin_W,

@@ -31,9 +31,9 @@ class ArmMotionParameters:
     period: float = 1 / 30
     """Time between two looks at what to do, s."""
     largest_jump: float = 0.05
-    """A path may begin this far from the commanded joint angles, rad; the rest is faded out."""
+    """A path may begin and end this far from the observation posture, rad; the rest is faded out ..."""
     fade_time: float = 0.5
-    """Over this time, s."""
+    """... and in, over this time, s."""
 
 
 @dataclass(frozen=True)
@@ -119,9 +119,10 @@ class ArmMotion(LeafSystem):
         """The joint angles [7] to command at a time."""
         if memory.push is None or memory.push.path is None:
             return self._q_observe
-        since = time - memory.start_time
-        fading = 1.0 - minimum_jerk(np.clip(since / self._parameters.fade_time, 0.0, 1.0))[0]
-        return memory.push.path.position(since) + fading * memory.offset
+        path, since = memory.push.path, time - memory.start_time
+        to_an_end = min(since, path.duration - since) / self._parameters.fade_time
+        fading = 1.0 - minimum_jerk(np.clip(to_an_end, 0.0, 1.0))[0]
+        return path.position(since) + fading * memory.offset
 
     def _calc_phase(self, memory: _Memory, time: float) -> ArmPhase:
         if memory.done:

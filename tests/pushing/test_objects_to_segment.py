@@ -2,13 +2,8 @@ import numpy as np
 
 from riseg_drake.pushing.objects_to_segment import (
     ObjectsToSegmentParameters,
-    binarize_mask,
     objects_to_segment,
 )
-
-
-def test_binarized_mask_is_true_where_there_is_an_id():
-    np.testing.assert_array_equal(binarize_mask(np.array([[0, 3], [65535, 0]])), [[0, 1], [1, 0]])
 
 
 def test_nothing_is_left_when_everything_is_segmented(drawn):

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from riseg_drake.pushing.table_map import TableMapParameters, map_table
+from riseg_drake.pushing.table_map import TableMapParameters, binarize_mask, map_table
 
 FLAT = np.array([0.0, 0.0, 1.0, 0.0])
 
@@ -11,6 +11,10 @@ def map_of(view, mask=None, robot=None, parameters=None):
     return map_table(
         view.depth, view.intrinsics, view.X_WC, view.objects, view.height, mask, FLAT, robot, parameters
     )
+
+
+def test_binarized_mask_is_true_where_there_is_an_id():
+    np.testing.assert_array_equal(binarize_mask(np.array([[0, 3], [65535, 0]])), [[0, 1], [1, 0]])
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.25])

@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -16,7 +18,7 @@ def test_profile_goes_from_0_to_1_and_its_derivatives_are_derivatives(profile):
     assert derivatives[:3, 0] == pytest.approx([0, 0, 0])
     assert derivatives[:3, -1] == pytest.approx([1, 0, 0])
     assert (np.diff(derivatives[0]) >= 0).all()
-    for lower, higher in zip(derivatives[:-1], derivatives[1:], strict=True):
+    for lower, higher in pairwise(derivatives):
         slope = np.gradient(lower, tau)
         # But for the instants where a ramp begins or ends, and the slope jumps.
         wrong = np.abs(slope - higher) > 2e-3 * np.abs(higher).max()

@@ -1,0 +1,199 @@
+"""ArmMotion through its ports, with a stand-in for everything that sees."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from pydrake.common.value import Value
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder, LeafSystem
+from pydrake.systems.primitives import VectorLogSink
+
+from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.geometry.rgbd import Frame, FramePair
+from riseg_drake.pushing.push import ArmPhase, Push
+from riseg_drake.pushing.push_path import PushPath
+from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest
+from riseg_drake.systems.arm_motion import ArmMotion, ArmMotionParameters
+
+Q_OBSERVE = np.array([0.0, -0.54, 0.0, -2.55, 0.0, 2.01, 0.0])
+CAMERA = Intrinsics(4, 4, 2.0, 2.0, 1.5, 1.5)
+SECONDS = 1 / 15
+
+
+def push_to(q_there, start_offset=0.0, at=0.0):
+    """A push whose path goes to q_there and back, in no time to speak of."""
+    there = rest_to_rest(np.array([Q_OBSERVE + start_offset, q_there]), minimum_jerk, SpeedLimits())
+    back = rest_to_rest(np.array([q_there, Q_OBSERVE + start_offset]), minimum_jerk, SpeedLimits())
+    middle = there.end_time()
+    back.shiftRight(middle)
+    there.ConcatenateInTime(back)
+    return Push(
+        p_WE=np.array([0.48 + at, 0.0, 0.008]),
+        tip_height=0.008,
+        direction_W=np.array([1.0, 0.0]),
+        p_WB=np.array([0.5 + at, 0.0, 0.02]),
+        length=0.03,
+        d_push=0.02,
+        center_W=np.array([0.52, 0.0]),
+        cluster_W=np.zeros((1, 2)),
+        tallest=0.05,
+        cost=0.0,
+        path=PushPath(there, push_start=middle / 2, push_end=middle),
+    )
+
+
+@dataclass
+class Script:
+    """What the stand-in answers: a push for each interaction, then None; and what the mask shows."""
+
+    pushes: list
+    ids_after: list = field(default_factory=lambda: [0] * 9)
+    asked: list = field(default_factory=list)
+
+
+class Eyes(LeafSystem):
+    """Camera, segmentation and planner in one: frames at 15 Hz, a scripted mask, scripted pushes."""
+
+    def __init__(self, script):
+        super().__init__()
+        self.script = script
+        anything = Value[object](None)
+        step = self.DeclareAbstractInputPort("interaction_step", anything)
+        time = {self.time_ticket()}
+
+        def frame(context):
+            sequence = int(context.get_time() / SECONDS + 1e-6)
+            color = np.zeros((4, 4, 3), np.uint8)
+            depth = np.full((4, 4), 0.5, np.float32)
+            return Frame(sequence, sequence * SECONDS, CAMERA, color, depth, np.eye(4), np.zeros((4, 4), bool))
+
+        def pair(context, output):
+            output.set_value(FramePair(frame(context), frame(context)))
+
+        def mask(context, output):
+            number = script.ids_after[step.Eval(context)]
+            output.set_value(np.full((4, 4), number, np.uint16))
+
+        def push(context, output):
+            script.asked.append((context.get_time(), frame(context).time))
+            done = step.Eval(context)
+            output.set_value(script.pushes[done] if done < len(script.pushes) else None)
+
+        for name, calc in (("pair", pair), ("mask", mask), ("push", push)):
+            self.DeclareAbstractOutputPort(
+                name, lambda: Value[object](None), calc, time | {self.all_input_ports_ticket()}
+            )
+
+
+def wired(script, parameters=None):
+    """ArmMotion with its stand-in, an arm that is where it is told to be, and a log of the commands."""
+    builder = DiagramBuilder()
+    motion = builder.AddSystem(ArmMotion(Q_OBSERVE, parameters))
+    eyes = builder.AddSystem(Eyes(script))
+    for name in ("pair", "mask", "push"):
+        builder.Connect(eyes.GetOutputPort(name), motion.GetInputPort(name))
+    builder.Connect(motion.GetOutputPort("interaction_step"), eyes.GetInputPort("interaction_step"))
+    builder.Connect(motion.GetOutputPort("position"), motion.GetInputPort("position_measured"))
+    log = builder.AddSystem(VectorLogSink(7, 0.002))
+    builder.Connect(motion.GetOutputPort("position"), log.get_input_port())
+    return builder.Build(), motion, log
+
+
+def run(script, until, parameters=None):
+    """Phases in their order, with the simulator's final context, ArmMotion and the log."""
+    diagram, motion, log = wired(script, parameters)
+    simulator = Simulator(diagram)
+    context = motion.GetMyContextFromRoot(simulator.get_context())
+    phases = []
+
+    def watch(root):
+        phase = motion.GetOutputPort("phase").Eval(context)
+        if not phases or phases[-1] is not phase:
+            phases.append(phase)
+
+    simulator.set_monitor(watch)
+    simulator.AdvanceTo(until)
+    return phases, motion, context, log.FindLog(simulator.get_context())
+
+
+THERE = Q_OBSERVE + np.array([0.3, 0.2, 0.0, 0.3, 0.0, 0.0, 0.5])
+
+
+def test_phases_come_in_their_order_and_null_ends_them():
+    phases, motion, context, _ = run(Script([push_to(THERE), push_to(THERE, at=0.1)]), 12.0)
+    once = [ArmPhase.APPROACH, ArmPhase.PUSH, ArmPhase.RETREAT, ArmPhase.OBSERVE]
+    assert phases == [ArmPhase.OBSERVE, *once, *once, ArmPhase.DONE]
+    assert motion.GetOutputPort("interaction_step").Eval(context) == 2
+    assert motion.GetOutputPort("active_push").Eval(context) is None
+
+
+def test_nothing_to_push_is_done_after_looking_twice():
+    script = Script([])
+    phases, _, _, _ = run(script, 2.0)
+    assert phases == [ArmPhase.OBSERVE, ArmPhase.DONE]
+    assert len({frame_time for _, frame_time in script.asked}) == len(script.asked) == 2
+
+
+def test_command_goes_from_the_observation_posture_and_back_without_a_jump():
+    _, _, _, log = run(Script([push_to(THERE)]), 6.0)
+    q, time = log.data(), log.sample_times()
+    velocity = np.diff(q) / np.diff(time)
+    assert q[:, 0] == pytest.approx(Q_OBSERVE)
+    assert q[:, -1] == pytest.approx(Q_OBSERVE)
+    assert np.abs(q - THERE[:, None]).max(axis=0).min() < 1e-3
+    assert np.abs(velocity).max() < 1.6
+    assert np.abs(np.diff(velocity)).max() / 0.002 < 10.0
+
+
+def test_path_planned_from_a_little_beside_the_command_is_joined_smoothly():
+    _, _, _, log = run(Script([push_to(THERE, start_offset=0.01)]), 2.0)
+    velocity = np.diff(log.data()) / np.diff(log.sample_times())
+    assert np.abs(np.diff(velocity)).max() / 0.002 < 10.0
+
+
+def test_path_that_begins_elsewhere_is_refused():
+    with pytest.raises(ValueError, match="begins 0\\.3"):
+        run(Script([push_to(THERE, start_offset=0.3)]), 2.0)
+
+
+def test_push_is_asked_for_only_in_frames_taken_after_the_arm_came_to_rest():
+    script = Script([push_to(THERE), push_to(THERE, at=0.1)])
+    parameters = ArmMotionParameters(settle_time=0.3)
+    _, _, _, log = run(script, 12.0, parameters)
+    time, moving = log.sample_times()[1:], (np.abs(np.diff(log.data())) > 1e-9).any(axis=0)
+    for asked, frame_time in script.asked:
+        before = time[moving & (time < asked - 1e-6)]
+        assert frame_time >= 0.3 - 1e-9
+        assert len(before) == 0 or frame_time >= before[-1] + 0.3 - 0.01
+    assert len(script.asked) == 4  # two pushes, and null twice
+
+
+def test_most_interactions_end_the_run():
+    script = Script([push_to(THERE)] * 9)
+    phases, motion, context, _ = run(script, 8.0, ArmMotionParameters(most_interactions=1))
+    assert phases[-1] is ArmPhase.DONE
+    assert motion.GetOutputPort("interaction_step").Eval(context) == 1
+    assert len(script.asked) == 1
+
+
+def test_push_is_remembered_with_whether_it_changed_the_mask():
+    script = Script([push_to(THERE), push_to(THERE, at=0.1)], ids_after=[0, 3, 3])
+    _, motion, context, _ = run(script, 12.0)
+    tried = motion.GetOutputPort("tried_pushes").Eval(context)
+    assert [push.changed for push in tried] == [True, False]
+    assert tried[1].p_WB == pytest.approx([0.6, 0.0, 0.02])
+
+
+def test_arm_that_is_not_where_it_should_be_is_waited_for():
+    motion = ArmMotion(Q_OBSERVE)
+    context = motion.CreateDefaultContext()
+    motion.GetInputPort("position_measured").FixValue(context, Q_OBSERVE + 0.1)
+    simulator = Simulator(motion, context)
+    simulator.AdvanceTo(2.0)  # neither pair nor push is connected: asking would throw
+    assert motion.GetOutputPort("phase").Eval(context) is ArmPhase.OBSERVE
+
+
+def test_no_output_depends_on_an_input_at_the_same_moment():
+    motion = ArmMotion(Q_OBSERVE)
+    assert not motion.HasAnyDirectFeedthrough()

@@ -1,0 +1,99 @@
+"""PushPlanner through its ports."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from pydrake.common.value import Value
+
+from riseg_drake.geometry.camera import Intrinsics, rays
+from riseg_drake.geometry.rgbd import Frame, FramePair
+from riseg_drake.pushing.tried_pushes import TriedPush
+from riseg_drake.robot.kinematics import PandaKinematics, observe_pose
+from riseg_drake.systems.push_planner import PushPlanner
+
+CAMERA = Intrinsics(640, 480, 616.285, 615.778, 301.418, 232.864)
+
+
+@dataclass(frozen=True)
+class AboveTable:
+    mask: np.ndarray
+    height: np.ndarray
+    plane_W: np.ndarray
+
+
+@pytest.fixture(scope="module")
+def panda():
+    return PandaKinematics()
+
+
+@pytest.fixture(scope="module")
+def q_observe(panda):
+    return panda.solve_ik(observe_pose([0.5, 0.0, 0.0], 0.5, panda.X_EC))
+
+
+@pytest.fixture(scope="module")
+def scene(panda, q_observe):
+    """A flat cylinder of 3 cm radius and 4 cm height at (0.5, 0.05), as the wrist camera sees its top."""
+    X_WC = panda.X_WC(q_observe)
+    direction_W = rays(CAMERA) @ X_WC[:3, :3].T
+    to_top = (0.04 - X_WC[2, 3]) / direction_W[..., 2]
+    p_WQ = X_WC[:3, 3] + to_top[..., None] * direction_W
+    top = np.linalg.norm(p_WQ[..., :2] - [0.5, 0.05], axis=-1) < 0.03
+    depth = np.where(top, to_top, -X_WC[2, 3] / direction_W[..., 2]).astype(np.float32)
+    color = np.zeros((*CAMERA.shape, 3), np.uint8)
+    frame = Frame(3, 0.2, CAMERA, color, depth, X_WC, np.zeros(CAMERA.shape, bool))
+    above = AboveTable(top, np.where(top, 0.04, 0.0), np.array([0.0, 0.0, 1.0, 0.0]))
+    return FramePair(frame, frame), above
+
+
+def evaluate(panda, q_observe, pair, above, mask, tried=None, seed=0):
+    planner = PushPlanner(panda, seed=seed)
+    context = planner.CreateDefaultContext()
+    planner.GetInputPort("pair").FixValue(context, Value[object](pair))
+    planner.GetInputPort("above_table").FixValue(context, Value[object](above))
+    planner.GetInputPort("mask").FixValue(context, Value[object](mask))
+    planner.GetInputPort("position").FixValue(context, q_observe)
+    if tried is not None:
+        planner.GetInputPort("tried_pushes").FixValue(context, Value[object](tried))
+    return planner.GetOutputPort("push").Eval(context)
+
+
+NOTHING = np.zeros(CAMERA.shape, np.uint16)
+
+
+def test_push_goes_through_the_object_and_has_a_path_from_here_to_here(panda, q_observe, scene):
+    push = evaluate(panda, q_observe, *scene, NOTHING)
+    assert push.center_W == pytest.approx([0.5, 0.05], abs=0.002)
+    assert push.path.position(0.0) == pytest.approx(q_observe)
+    assert push.path.position(push.path.duration) == pytest.approx(q_observe)
+    reached = panda.X_WE(push.path.position(push.path.push_end))[:2, 3]
+    # The bar's face has moved the object's outline by d_push: what is left to the center is less.
+    assert np.linalg.norm(reached - push.center_W) == pytest.approx(0.03 + 0.01 - 0.02, abs=0.003)
+
+
+def test_segmented_scene_gives_null(panda, q_observe, scene):
+    assert evaluate(panda, q_observe, *scene, scene[1].mask.astype(np.uint16)) is None
+
+
+def test_before_the_first_frame_there_is_no_push(panda, q_observe, scene):
+    assert evaluate(panda, q_observe, None, scene[1], NOTHING) is None
+
+
+def test_same_seed_and_frame_give_the_same_push(panda, q_observe, scene):
+    first, second = (evaluate(panda, q_observe, *scene, NOTHING, seed=5) for _ in range(2))
+    assert np.array_equal(first.p_WE, second.p_WE)
+
+
+def test_push_tried_in_vain_is_not_proposed_again(panda, q_observe, scene):
+    first = evaluate(panda, q_observe, *scene, NOTHING)
+    tried = (TriedPush(first.p_WB, first.direction_W, changed=False),)
+    second = evaluate(panda, q_observe, *scene, NOTHING, tried=tried)
+    assert first.direction_W @ second.direction_W < np.cos(0.5)
+
+
+def test_ports_have_the_names_of_the_contract(panda):
+    planner = PushPlanner(panda)
+    names = [planner.get_input_port(i).get_name() for i in range(planner.num_input_ports())]
+    assert names == ["pair", "above_table", "mask", "position", "tried_pushes"]
+    assert planner.get_output_port().get_name() == "push"
