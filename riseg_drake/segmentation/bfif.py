@@ -23,7 +23,7 @@ from riseg_drake.segmentation.motions import (
     misfits,
     settle_groups,
 )
-from riseg_drake.segmentation.noise import MeasurementNoise
+from riseg_drake.segmentation.noise import MeasurementNoise, flow_sigma, smooth_gray
 from riseg_drake.segmentation.twists import Twists, patch_twists, triplet_twists
 
 
@@ -65,7 +65,9 @@ def group_body_frames(
     moving = moving_pixels(pair, expected_flow, optical_flow, above_0.mask, noise, parameters.moving)
     if not moving.any():
         return no_groups()
-    frames = sample_body_frames(pair, optical_flow, moving, parameters.frames, rng)
+    sigma = flow_sigma(smooth_gray(pair.reference.color), noise)
+    trusted = moving & (sigma <= noise.flow_max)
+    frames = sample_body_frames(pair, optical_flow, trusted, sigma, parameters.frames, rng)
     if len(frames) < parameters.grouping.members_min:
         return no_groups()
     twists = _calc_bfifs(frames, above_0.depth_noise, focal_length, parameters)
@@ -108,11 +110,11 @@ def _settled_groups(
     """
 
     def fit(group: NDArray[np.intp]) -> NDArray[np.float64]:
-        return group_motions(frames, group, parameters.noise, depth_noise, focal_length)
+        return group_motions(frames, group, depth_noise, focal_length)
 
     group = group_twists(twists, parameters.grouping)
     for _ in range(parameters.settling_rounds):
-        misfit = misfits(frames, fit(group), parameters.noise, depth_noise, focal_length)
+        misfit = misfits(frames, fit(group), depth_noise, focal_length)
         group = settle_groups(frames, misfit, twists.misfit, parameters.motions)
         left = group < 0
         again = group_twists(twists.subset(left), parameters.grouping)
@@ -146,4 +148,4 @@ def _calc_bfifs(
     p_C0S = frames.p_C0Q0[:, 0].mean(0) if at_points else np.zeros(3)
     if parameters.frames.kind == "triplets":
         return triplet_twists(frames, p_C0S)
-    return patch_twists(frames, p_C0S, parameters.noise.flow, depth_noise, focal_length)
+    return patch_twists(frames, p_C0S, depth_noise, focal_length)

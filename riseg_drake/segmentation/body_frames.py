@@ -44,6 +44,8 @@ class BodyFrames:
     """[K, M, 3], the same points at t, seen from the unmoved camera C0, m."""
     depth_1: NDArray[np.float64]
     """[K, M], depth at t, m (its noise is not that of t-1)."""
+    flow_sigma: NDArray[np.float64]
+    """[K, M], standard deviation of the flow by which each point was tracked, pixels."""
     used: NDArray[np.bool_]
     """[K, M], points that belong to the frame."""
 
@@ -58,6 +60,7 @@ class BodyFrames:
             self.p_C0Q0[which],
             self.p_C0Q1[which],
             self.depth_1[which],
+            self.flow_sigma[which],
             self.used[which],
         )
 
@@ -92,6 +95,7 @@ def sample_body_frames(
     pair: FramePair,
     optical_flow: NDArray[np.float32],
     moving: NDArray[np.bool_],
+    sigma: NDArray[np.float32],
     parameters: BodyFrameParameters,
     rng: np.random.Generator,
 ) -> BodyFrames:
@@ -101,6 +105,7 @@ def sample_body_frames(
         pair: the frames of t-1 and t.
         optical_flow: O_t [H, W, 2], pixels.
         moving: [H, W], ||X_t|| >> 0.
+        sigma: [H, W], standard deviation of O_t, pixels.
         parameters: see there; ValueError for an unknown kind.
         rng: draws seeds and neighbours.
     """
@@ -128,7 +133,9 @@ def sample_body_frames(
     used = inside & good[v, u] & (depth_1 > 0) & near
     enough = used.sum(1) >= (3 if is_triplet else parameters.points_min)
     keep = enough & used[:, 0] & (_extent_ratio(p_0, used) >= parameters.width_min)
-    return BodyFrames(seeds[keep], p_0[keep], p_1[keep], depth_1[keep], used[keep])
+    return BodyFrames(
+        seeds[keep], p_0[keep], p_1[keep], depth_1[keep], sigma[v, u][keep].astype(float), used[keep]
+    )
 
 
 def _spread_seeds(good: NDArray[np.bool_], count: int, rng: np.random.Generator) -> NDArray[np.intp]:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.rgbd import Immutable
 from riseg_drake.geometry.se3 import exp_se3, move_points, translation
 from riseg_drake.segmentation.body_frames import BodyFrames
-from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.twists import fit_motion, point_precision
 
 _AHEAD = np.array([[0.0, 0.0, 0.4], [0.05, 0.0, 0.4], [0.0, 0.05, 0.4]])
@@ -62,7 +61,6 @@ class BFIFGroups(Immutable):
 def group_motions(
     frames: BodyFrames,
     group: NDArray[np.intp],
-    noise: MeasurementNoise,
     depth_noise: float,
     focal_length: float,
 ) -> NDArray[np.float64]:
@@ -71,8 +69,10 @@ def group_motions(
     for g in range(group.max(initial=-1) + 1):
         used = frames.used & (group == g)[:, None]
         stride = max(1, int(used.sum() // _POINTS_MAX))
-        q_0, q_1, z_1 = (a[used][::stride] for a in (frames.p_C0Q0, frames.p_C0Q1, frames.depth_1))
-        W = point_precision(q_0, z_1, noise.flow, depth_noise, focal_length)
+        q_0, q_1, z_1, sigma = (
+            a[used][::stride] for a in (frames.p_C0Q0, frames.p_C0Q1, frames.depth_1, frames.flow_sigma)
+        )
+        W = point_precision(q_0, z_1, sigma, depth_noise, focal_length)
         centre = q_0.mean(0)
         everyone = np.ones((1, len(q_0)), bool)
         V_B, _, _ = fit_motion((q_0 - centre)[None], (q_1 - centre)[None], W[None], everyone)
@@ -83,12 +83,11 @@ def group_motions(
 def misfits(
     frames: BodyFrames,
     motions: NDArray,
-    noise: MeasurementNoise,
     depth_noise: float,
     focal_length: float,
 ) -> NDArray[np.float64]:
     """Mean squared normalised residual [K, G] of each body frame's points under each motion."""
-    W = point_precision(frames.p_C0Q0, frames.depth_1, noise.flow, depth_noise, focal_length)
+    W = point_precision(frames.p_C0Q0, frames.depth_1, frames.flow_sigma, depth_noise, focal_length)
     count = 3.0 * frames.used.sum(1)
     columns = []
     for X in motions:

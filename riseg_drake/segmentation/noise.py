@@ -6,6 +6,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+_WINDOW = 9
+"""Pixels on a side of the window that flow is taken to match; DIS matches patches of 8."""
+_NOISE_GRADIENT = 0.057
+"""Mean squared gradient of white noise of variance 1 after `smooth_gray`: not texture."""
+
 
 @dataclass
 class MeasurementNoise:
@@ -13,7 +18,9 @@ class MeasurementNoise:
 
     flow: float = 0.2
     """Standard deviation of optical flow on textured surfaces, pixels."""
-    color: float = 3.0
+    flow_max: float = 2.0
+    """Where so little texture is that flow is worse than that, pixels, it is not used."""
+    color: float = 2.0
     """Standard deviation of a gray value, of 255."""
     registration: float = 0.25
     """How far a rightly predicted pixel still is from where it appears (interpolation, pose), pixels."""
@@ -38,3 +45,20 @@ def gray_variance(gray: NDArray[np.float32], noise: MeasurementNoise) -> NDArray
     gradient_squared = cv2.Sobel(gray, cv2.CV_32F, 1, 0, scale=0.125) ** 2
     gradient_squared += cv2.Sobel(gray, cv2.CV_32F, 0, 1, scale=0.125) ** 2
     return np.float32(2 * noise.color**2) + np.float32(noise.registration**2) * gradient_squared
+
+
+def flow_sigma(gray: NDArray[np.float32], noise: MeasurementNoise) -> NDArray[np.float32]:
+    """Standard deviation [H, W] of optical flow, pixels, as far as the image itself tells.
+
+    Matching a window of n pixels finds a shift to within 2 sigma^2 / (n lambda), with lambda the mean
+    squared gradient in the direction where there is least of it (Lucas and Kanade's normal equations).
+    """
+    gradient_u = cv2.Sobel(gray, cv2.CV_32F, 1, 0, scale=0.125)
+    gradient_v = cv2.Sobel(gray, cv2.CV_32F, 0, 1, scale=0.125)
+    uu, uv, vv = (
+        cv2.boxFilter(a * b, -1, (_WINDOW, _WINDOW))
+        for a, b in ((gradient_u, gradient_u), (gradient_u, gradient_v), (gradient_v, gradient_v))
+    )
+    least = 0.5 * (uu + vv - np.sqrt((uu - vv) ** 2 + 4 * uv**2))
+    texture = np.maximum(least - np.float32(_NOISE_GRADIENT * noise.color**2), np.float32(1e-3))
+    return np.sqrt(np.float32(noise.flow**2) + np.float32(2 * noise.color**2 / _WINDOW**2) / texture)

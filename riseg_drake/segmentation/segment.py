@@ -15,8 +15,9 @@ from riseg_drake.segmentation.association import (
     associate,
 )
 from riseg_drake.segmentation.effective_flow import effective_flow
-from riseg_drake.segmentation.growth import GrowthParameters, grow_by_similar_flow, label_by_motion
+from riseg_drake.segmentation.growth import GrowthParameters, grow_by_similar_flow
 from riseg_drake.segmentation.memory import Memory, draw_memory, moved_memory, remember
+from riseg_drake.segmentation.motion_labels import MotionLabelParameters, label_by_motion
 from riseg_drake.segmentation.motions import (
     BFIFGroups,
     MotionParameters,
@@ -33,6 +34,10 @@ class SegmentParameters:
 
     noise: MeasurementNoise = field(default_factory=MeasurementNoise)
     motions: MotionParameters = field(default_factory=MotionParameters)
+    outline: str = "motion"
+    """"motion" (which motion explains a pixel, motion_labels.py) or "flow" (breadth first search over
+    similar flow, as in the paper, growth.py)."""
+    labels: MotionLabelParameters = field(default_factory=MotionLabelParameters)
     growth: GrowthParameters = field(default_factory=GrowthParameters)
     association: AssociationParameters = field(default_factory=AssociationParameters)
     propagation: str = "reference"
@@ -189,12 +194,18 @@ def _grow(
     parameters: SegmentParameters,
 ) -> NDArray[np.int16]:
     """Line 7's growth from seeds to pixels, in the view of t-1: 1 + motion, 0 = stands still."""
-    if parameters.growth.kind == "motion":
+    if parameters.outline == "motion":
         return label_by_motion(
-            pair, above_0.mask, motions, parameters.noise, above_0.depth_noise, parameters.growth
+            pair,
+            above_0.mask,
+            above_0.height,
+            motions,
+            parameters.noise,
+            above_0.depth_noise,
+            parameters.labels,
         )
-    if parameters.growth.kind != "flow":
-        raise ValueError(f"no growth {parameters.growth.kind!r}: choose motion or flow")
+    if parameters.outline != "flow":
+        raise ValueError(f"no outline {parameters.outline!r}: choose motion or flow")
     X_t = effective_flow(optical_flow, expected_flow)
     with np.errstate(invalid="ignore"):
         moving = above_0.mask & ((X_t**2).sum(-1) > parameters.growth.flow_min**2)

@@ -75,19 +75,16 @@ def triplet_twists(frames: BodyFrames, p_C0S: NDArray) -> Twists:
     return Twists(V_S, np.broadcast_to(sample, (K, 6, 6)), p_C0S, np.ones(K))
 
 
-def patch_twists(
-    frames: BodyFrames, p_C0S: NDArray, flow_noise: float, depth_noise: float, focal_length: float
-) -> Twists:
+def patch_twists(frames: BodyFrames, p_C0S: NDArray, depth_noise: float, focal_length: float) -> Twists:
     """BFIFs of patches by weighted least squares, each with its own covariance.
 
     Args:
         frames: K patches.
         p_C0S: [3], where the space frame lies.
-        flow_noise: standard deviation of flow, pixels.
         depth_noise: standard deviation of depth at 1 m, m.
         focal_length: pixels.
     """
-    W = point_precision(frames.p_C0Q0, frames.depth_1, flow_noise, depth_noise, focal_length)
+    W = point_precision(frames.p_C0Q0, frames.depth_1, frames.flow_sigma, depth_noise, focal_length)
     centre = (frames.p_C0Q0 * frames.used[..., None]).sum(1) / frames.used.sum(1)[:, None]
     q_0, q_1 = (p - centre[:, None] for p in (frames.p_C0Q0, frames.p_C0Q1))
     V_B, covariance, misfit = fit_motion(q_0, q_1, W, frames.used)
@@ -96,7 +93,7 @@ def patch_twists(
 
 
 def point_precision(
-    p_CQ: NDArray, depth_1: NDArray, flow_noise: float, depth_noise: float, focal_length: float
+    p_CQ: NDArray, depth_1: NDArray, flow_noise: NDArray, depth_noise: float, focal_length: float
 ) -> NDArray[np.float64]:
     """Inverse covariance [..., 3, 3] of a point's displacement: flow noise across, depth along the ray."""
     z = np.maximum(p_CQ[..., 2], 1e-3)

@@ -24,7 +24,8 @@ def moved_frames(V: np.ndarray, rng: np.random.Generator, count: int = 30, point
     p_0 = centres[:, None] + rng.uniform(-0.01, 0.01, (count, points, 3))
     p_1 = move_points(exp_se3(V), p_0)
     pixel = np.zeros((count, 2), np.intp)
-    return BodyFrames(pixel, p_0, p_1, p_1[..., 2], np.ones((count, points), bool))
+    ones = np.ones((count, points))
+    return BodyFrames(pixel, p_0, p_1, p_1[..., 2], 0.2 * ones, ones > 0)
 
 
 TWISTS = [
@@ -46,7 +47,7 @@ def test_all_triplets_on_one_body_have_its_twist(V: np.ndarray) -> None:
 @pytest.mark.parametrize("V", TWISTS)
 def test_all_patches_on_one_body_have_its_twist(V: np.ndarray) -> None:
     frames = moved_frames(V, np.random.default_rng(1))
-    twists = patch_twists(frames, np.zeros(3), flow_noise=0.2, depth_noise=0.002, focal_length=600)
+    twists = patch_twists(frames, np.zeros(3), depth_noise=0.002, focal_length=600)
     np.testing.assert_allclose(twists.V_S, np.broadcast_to(V, (30, 6)), atol=1e-8)
 
 
@@ -55,7 +56,7 @@ def test_another_space_frame_shows_the_same_motion(kind) -> None:
     V = TWISTS[2]
     p_C0S = np.array([0.05, -0.02, 0.45])
     frames = moved_frames(V, np.random.default_rng(2), points=3 if kind is triplet_twists else 20)
-    arguments = () if kind is triplet_twists else (0.2, 0.002, 600)
+    arguments = () if kind is triplet_twists else (0.002, 600)
     twists = kind(frames, p_C0S, *arguments)
     p_SQ = np.array([[0.01, 0.02, 0.03]])
     moved_in_S = move_points(exp_se3(twists.V_S[0]), p_SQ)
@@ -93,7 +94,7 @@ def test_the_propagated_covariance_is_what_repeated_noise_scatters() -> None:
     z = q_0[..., 2]
     noise = rng.normal(size=q_0.shape) * (z * flow_noise / focal_length)[..., None]
     noise[..., 2] = rng.normal(size=z.shape) * np.sqrt(2) * depth_noise * z**2
-    W = point_precision(q_0, z, flow_noise, depth_noise, focal_length)
+    W = point_precision(q_0, z, np.full(z.shape, flow_noise), depth_noise, focal_length)
     centre = q_0.mean(axis=(0, 1))
     V, covariance, misfit = fit_motion(q_0 - centre, q_0 + noise - centre, W, np.ones(z.shape, bool))
     # Robust weights give away some of the information, so the claim is a little cautious.
@@ -107,7 +108,7 @@ def test_a_few_points_of_another_body_hardly_move_the_fit() -> None:
     V = TWISTS[1]
     frames = moved_frames(V, np.random.default_rng(5), count=10)
     frames.p_C0Q1[:, :4] += 0.02
-    twists = patch_twists(frames, np.array([0, 0, 0.45]), 0.2, 0.002, 600.0)
+    twists = patch_twists(frames, np.array([0, 0, 0.45]), 0.002, 600.0)
     clean = patch_twists(
         moved_frames(V, np.random.default_rng(5), count=10), np.array([0, 0, 0.45]), 0.2, 0.002, 600.0
     )

@@ -1,0 +1,93 @@
+"""Small pieces of an image that follow its edges: the pixels of a blank surface decide together."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+_HEIGHT_STEPS = 2000.0
+"""Gray levels a metre of height is worth beside colour: half a millimetre is one level."""
+
+
+@dataclass(frozen=True)
+class Superpixels:
+    """N pieces of a masked image, and the M borders between neighbours."""
+
+    label: NDArray[np.intp]
+    """[H, W], 0..N-1, or -1 outside the mask."""
+    count: int
+    """N."""
+    borders: NDArray[np.intp]
+    """[M, 2], the two pieces of each border, the smaller number first."""
+    length: NDArray[np.float64]
+    """[M], pixels along each border."""
+    contrast: NDArray[np.float64]
+    """[M], mean difference across each border, gray levels (of colour or of height, whichever is more)."""
+
+
+def superpixels(
+    color: NDArray[np.uint8], height: NDArray[np.float32], mask: NDArray[np.bool_], size: int
+) -> Superpixels:
+    """Cut what is masked into pieces of about `size` x `size` pixels by a watershed from a grid.
+
+    Args:
+        color: [H, W, 3], RGB.
+        height: [H, W], m above the table, NaN where unknown.
+        mask: [H, W], what to cut.
+        size: pixels between the seeds.
+    """
+    image = _edges_image(color, height)
+    markers = np.zeros(mask.shape, np.int32)
+    seeds = np.zeros(mask.shape, bool)
+    seeds[size // 2 :: size, size // 2 :: size] = True
+    # Each connected piece gets a seed, however small.
+    _, piece = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)
+    missing = np.setdiff1d(np.unique(piece), np.unique(piece[seeds]))
+    for number in missing[missing > 0]:
+        v, u = np.argwhere(piece == number)[0]
+        seeds[v, u] = True
+    v, u = np.nonzero(seeds & mask)
+    markers[v, u] = np.arange(len(v)) + 1
+    markers[~mask] = len(v) + 1
+    flooded = cv2.watershed(image, markers).astype(np.float32)
+    flooded[~mask] = 0
+    # Watershed leaves ridges of one pixel between basins; a neighbour takes them.
+    for _ in range(2):
+        ridge = mask & (flooded <= 0)
+        flooded[ridge] = cv2.dilate(np.where(flooded == len(v) + 1, 0, flooded), _CROSS)[ridge]
+    label = np.where(mask & (flooded <= len(v)), flooded, 0).astype(np.intp) - 1
+    return _with_borders(label, len(v), image)
+
+
+_CROSS = np.ones((3, 3), np.uint8)
+
+
+def _edges_image(color: NDArray[np.uint8], height: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Brightness, a colour difference and height as the channels of an image [H, W, 3]."""
+    smooth = cv2.GaussianBlur(color, (0, 0), 1.0)
+    gray = cv2.cvtColor(smooth, cv2.COLOR_RGB2GRAY)
+    warm = (smooth[..., 0].astype(np.int16) - smooth[..., 2]) // 2 + 128
+    levels = np.clip(np.nan_to_num(height) * _HEIGHT_STEPS, 0, 255).astype(np.uint8)
+    return np.stack([gray, warm.astype(np.uint8), cv2.medianBlur(levels, 5)], axis=-1)
+
+
+def _with_borders(label: NDArray[np.intp], count: int, image: NDArray[np.uint8]) -> Superpixels:
+    """Find which pieces touch, along how many pixels, and how much they differ there."""
+    codes, steps = [], []
+    values = image.astype(np.int16)
+    for axis in (0, 1):
+        a, b = (np.take(label, range(k, label.shape[axis] - 1 + k), axis) for k in (0, 1))
+        touching = (a != b) & (a >= 0) & (b >= 0)
+        # Two pixels to either side: an edge is blurred over its width.
+        far_a = np.roll(values, 1, axis)
+        far_b = np.roll(values, -2, axis)
+        step = np.abs(far_a - far_b).max(-1)
+        step = np.take(step, range(label.shape[axis] - 1), axis)
+        low, high = np.minimum(a, b)[touching], np.maximum(a, b)[touching]
+        codes.append(low * count + high)
+        steps.append(step[touching])
+    code, inverse, length = np.unique(np.concatenate(codes), return_inverse=True, return_counts=True)
+    contrast = np.bincount(inverse, np.concatenate(steps), len(code)) / np.maximum(length, 1)
+    borders = np.stack(np.divmod(code, max(count, 1)), axis=1)
+    return Superpixels(label, count, borders, length.astype(float), contrast)
