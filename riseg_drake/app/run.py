@@ -64,7 +64,7 @@ def run(
         listeners: list[Listener] = [lambda *_: narrator.follow(progress)]
         if record:
             writer = stack.enter_context(RecordingWriter(folder.path / RECORDING, wired.intrinsics))
-            listeners.append(_recorder(wired, writer))
+            listeners.append(recorder(wired, writer))
         if meshcat is not None:
             stack.enter_context(_replay(meshcat, folder.path / REPLAY))
         for step in interactions(wired, StageClock(), progress, scenario.longest, tuple(listeners)):
@@ -142,7 +142,7 @@ def _state_of(folder: RunFolder, progress: Progress, steps: list[Step]) -> Itera
     finish("done", progress.end)
 
 
-def _recorder(wired: WiredDiagram, writer: RecordingWriter) -> Listener:
+def recorder(wired: WiredDiagram, writer: RecordingWriter) -> Listener:
     """Writes every frame, with the truth that the simulation knows."""
 
     def record(frame: Frame, context: Context) -> None:

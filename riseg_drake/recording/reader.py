@@ -75,7 +75,9 @@ class RecordingReader:
         image = self._read_image(name)
         if image.dtype != np.uint16 or image.ndim != 2:
             raise RecordingError(f"{self.folder / name}: depth images have one channel of 16 bits")
-        depth = np.where(image == 65535, 0, image).astype(np.float32) / np.float32(self._depth_scale)
+        # A product, as depth sensors and Drake make it: a quotient can differ in the last bit.
+        metres_per_unit = np.float32(1 / self._depth_scale)
+        depth = np.where(image == 65535, 0, image).astype(np.float32) * metres_per_unit
         return sanitize_depth(depth)
 
     def _read_beside(self, folder: str, color_name: str) -> NDArray[np.uint16] | None:

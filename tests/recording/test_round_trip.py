@@ -16,7 +16,7 @@ def frames(number, rng):
         X_WC = np.eye(4)
         X_WC[:3, :3] = Rotation.random(rng=rng).as_matrix()
         X_WC[:3, 3] = rng.normal(size=3)
-        depth = rng.integers(0, 3000, INTRINSICS.shape).astype(np.float32) / np.float32(1000)
+        depth = rng.integers(0, 3000, INTRINSICS.shape).astype(np.float32) * np.float32(0.001)
         yield RecordedFrame(
             time=k / 15,
             color=rng.integers(0, 256, (*INTRINSICS.shape, 3), np.uint8),
