@@ -92,3 +92,15 @@ def test_models_and_scenarios_are_installed_to_the_last_file(installed, tmp_path
     )
     assert there >= set(wanted.stdout.split("\n")) - {""}
     assert there
+
+
+def test_an_installed_copy_loads_its_scenario_and_its_models(installed, tmp_path):
+    program = (
+        "from riseg_drake.app.scenario import load_scenario\n"
+        "from riseg_drake.robot.kinematics import PandaKinematics\n"
+        "from riseg_drake.stations.object_models import find_models\n"
+        "scenario = load_scenario(None)\n"
+        "PandaKinematics(scenario.station.panda)\n"
+        "print(len(find_models(scenario.station.scene.objects, [])))\n"
+    )
+    assert int(run(installed / "python", "-c", program, cwd=tmp_path)) >= 12

@@ -117,8 +117,8 @@ def make_diagram(scenario: Scenario, seed: int, meshcat: Meshcat | None = None) 
     builder = DiagramBuilder()
     builder.AddSystem(station)
     segmentation = add_segmentation(builder, scenario, kinematics, seed)
-    planner = builder.AddNamedSystem("PushPlanner", PushPlanner(kinematics, scenario.push, seed))
-    arm = builder.AddNamedSystem("ArmMotion", ArmMotion(q_observe, scenario.arm))
+    planner = builder.AddSystem(PushPlanner(kinematics, scenario.push, seed))
+    arm = builder.AddSystem(ArmMotion(q_observe, scenario.arm))
 
     for name, port in STATION_PORTS.items():
         builder.Connect(station.GetOutputPort(port), segmentation.inputs[name])

@@ -5,7 +5,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from riseg_drake.app.scenario_file import parse_scenario, read_scenario
-from riseg_drake.pushing.plan_push import PushPlanningParameters
+from riseg_drake.pushing.push_planning import PushPlanningParameters
 from riseg_drake.segmentation.above_table import AboveTableParameters
 from riseg_drake.segmentation.bfif import BFIFParameters
 from riseg_drake.segmentation.frame_pairs import FramePairParameters
