@@ -1,4 +1,4 @@
-"""Alg. 3, lines 2 to 5: what stands on the table and has no object id yet."""
+"""Alg. 3, lines 3 to 5: what stands on the table and has no object id yet."""
 
 from dataclasses import dataclass
 

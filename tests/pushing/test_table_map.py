@@ -36,6 +36,15 @@ def test_cell_is_segmented_where_its_highest_point_has_an_id(view):
     assert not table.lookup(table.segmented, np.array([0.5, 0.05]))
 
 
+def test_height_of_a_cell_is_that_of_its_highest_point(view):
+    seen = view([(0.57, 0.1, 0.05, 0.05, 0.08)])  # off to the side: its flanks show
+    table = map_of(seen, parameters=TableMapParameters(cell=0.02))
+    assert (seen.height[seen.objects] < 0.05).any()
+    heights = table.height[table.objects]
+    assert np.count_nonzero(heights > 0.0799) >= 6
+    assert np.count_nonzero(heights < 0.0799) <= 1
+
+
 def test_what_a_box_hides_and_what_the_robot_covers_is_not_seen(view):
     seen = view([(0.5, 0.1, 0.05, 0.05, 0.1)])
     robot = np.zeros(seen.depth.shape, bool)
