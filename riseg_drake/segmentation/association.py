@@ -27,9 +27,9 @@ UNKNOWN = np.uint16(65535)
 class AssociationParameters:
     """Evidence that a decision needs."""
 
-    area_min: float = 2.0e-4
+    area_min: float = 3.0e-4
     """m^2; a smaller moving piece is no object."""
-    rim: float = 0.004
+    rim: float = 0.005
     """m; what is nowhere wider than twice that is a rim of something else, not a piece of its own."""
     split_share: float = 0.2
     """A part that moves otherwise splits an object if it is at least that share of it."""

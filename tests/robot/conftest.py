@@ -15,9 +15,7 @@ def official_models() -> str:
     for folder in [Path(named)] if named else nearby:
         if (folder / "package.xml").is_file():
             return str(folder)
-    pytest.skip(
-        "no offline copy of drake_models: set RISEG_DRAKE_MODELS to compare with the official Panda"
-    )
+    pytest.skip("no offline copy of drake_models: set RISEG_DRAKE_MODELS to compare with the official Panda")
 
 
 @pytest.fixture(scope="module")

@@ -82,9 +82,7 @@ def test_limits_and_actuators_agree_with_the_official_description(ours, official
     for i in range(1, 8):
         motors = [plant.GetJointActuatorByName(f"panda_motor{i}") for plant, _ in (ours, official)]
         assert motors[0].effort_limit() == motors[1].effort_limit()
-        assert motors[0].default_reflected_inertia() == pytest.approx(
-            motors[1].default_reflected_inertia()
-        )
+        assert motors[0].default_reflected_inertia() == pytest.approx(motors[1].default_reflected_inertia())
 
 
 def test_masses_and_inertias_agree_with_the_official_description(ours, official):
@@ -93,9 +91,7 @@ def test_masses_and_inertias_agree_with_the_official_description(ours, official)
         for plant, _ in (ours, official):
             body = plant.GetBodyByName(f"panda_link{link}")
             inertias.append(body.CalcSpatialInertiaInBodyFrame(plant.CreateDefaultContext()))
-        np.testing.assert_allclose(
-            inertias[0].CopyToFullMatrix6(), inertias[1].CopyToFullMatrix6(), atol=1e-12
-        )
+        np.testing.assert_allclose(inertias[0].CopyToFullMatrix6(), inertias[1].CopyToFullMatrix6(), atol=1e-12)
 
 
 def test_a_missing_folder_of_official_models_is_named():

@@ -110,7 +110,7 @@ def test_a_few_points_of_another_body_hardly_move_the_fit() -> None:
     frames.p_C0Q1[:, :4] += 0.02
     twists = patch_twists(frames, np.array([0, 0, 0.45]), 0.002, 600.0)
     clean = patch_twists(
-        moved_frames(V, np.random.default_rng(5), count=10), np.array([0, 0, 0.45]), 0.2, 0.002, 600.0
+        moved_frames(V, np.random.default_rng(5), count=10), np.array([0, 0, 0.45]), 0.002, 600.0
     )
     assert np.abs(twists.V_S - clean.V_S)[:, 3:].max() < 0.002
     assert (twists.misfit > 5 * clean.misfit).all()
