@@ -32,6 +32,9 @@ class ClustersParameters:
     concavity: float = 0.008
     """A piece whose outline nowhere recedes more than this from its convex hull, m, is one cluster:
     where things touch, there mostly is a nook."""
+    least_with_nook: int = 2
+    """A piece with a nook that no neck divides is at least this many clusters: half an object moves as
+    well as a whole one, but two objects pushed together look like one."""
     clustering: ClusteringParameters = field(default_factory=ClusteringParameters)
 
 
@@ -53,15 +56,12 @@ def find_clusters(
 ) -> Iterator[list[Cluster]]:
     """centers and clusterPoints of objsToSegment; then, if asked again, ever finer ones."""
     pieces = take_apart(to_segment, table, parameters) if parameters.by_piece else [to_segment]
-    divisions = [
-        clusterings(
-            table.points(piece),
-            parameters.clustering,
-            rng,
-            one_first=parameters.by_piece and concavity(piece, table.cell) <= parameters.concavity,
-        )
-        for piece in pieces
-    ]
+    divisions = []
+    for piece in pieces:
+        whole = parameters.by_piece and concavity(piece, table.cell) <= parameters.concavity
+        least = parameters.least_with_nook if parameters.by_piece else 1
+        p_WQ = table.points(piece)
+        divisions.append(clusterings(p_WQ, parameters.clustering, rng, one_first=whole, least=least))
     current: list[Clustering | None] = [None] * len(pieces)
     for _ in count():
         finer = [next(division, None) for division in divisions]

@@ -77,3 +77,11 @@ def test_limbs_stay_with_their_body(drawn):
         drawn.box(x, -0.03, 0.012, 0.03)
     table = drawn.map()
     assert len(take_apart(table.objects, table, ClustersParameters())) == 1
+
+
+def test_piece_with_a_nook_that_nothing_divides_is_at_least_two_clusters(drawn):
+    table = drawn.disc(0.5, 0.0, 0.05).disc(0.55, 0.0, 0.025).box(0.5, -0.05, 0.07, 0.05).map()
+    if len(take_apart(table.objects, table, ClustersParameters())) > 1:
+        pytest.fail("the drawing has a neck; it should not")
+    assert concavity(table.objects, table.cell) > ClustersParameters().concavity
+    assert len(first_clusters(table)) >= 2
