@@ -24,7 +24,7 @@ from riseg_drake.segmentation.motions import (
     settle_groups,
 )
 from riseg_drake.segmentation.noise import MeasurementNoise, flow_sigma, smooth_gray
-from riseg_drake.segmentation.twists import Twists, patch_twists, triplet_twists
+from riseg_drake.segmentation.twists import Twists, patch_twists, sliding_prior, triplet_twists
 
 
 @dataclass
@@ -70,9 +70,11 @@ def group_body_frames(
     frames = sample_body_frames(pair, optical_flow, trusted, sigma, parameters.frames, rng)
     if len(frames) < parameters.grouping.members_min:
         return no_groups()
-    twists = _calc_bfifs(frames, above_0.depth_noise, focal_length, parameters)
+    normal_C0 = pair.reference.X_WC[:3, :3].T @ above_0.plane_W[:3]
+    prior = sliding_prior(normal_C0, parameters.motions.tilt, parameters.motions.lift)
+    twists = _calc_bfifs(frames, above_0.depth_noise, focal_length, prior, parameters)
     frames, twists = _on_one_body(frames, twists, parameters.motions.misfit_max)
-    group, motions = _settled_groups(frames, twists, above_0.depth_noise, focal_length, parameters)
+    group, motions = _settled_groups(frames, twists, above_0.depth_noise, focal_length, prior, parameters)
     seeds = frames.p_C0Q0[:, 0]
     spans = [flow_difference(seeds[group == g], X, np.eye(4), focal_length) for g, X in enumerate(motions)]
     return BFIFGroups(
@@ -101,6 +103,7 @@ def _settled_groups(
     twists: Twists,
     depth_noise: float,
     focal_length: float,
+    prior: NDArray[np.float64],
     parameters: BFIFParameters,
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """Line 6, GroupBFIFs: the group of each frame, and the groups' motions.
@@ -110,7 +113,7 @@ def _settled_groups(
     """
 
     def fit(group: NDArray[np.intp]) -> NDArray[np.float64]:
-        return group_motions(frames, group, depth_noise, focal_length)
+        return group_motions(frames, group, depth_noise, focal_length, prior)
 
     group = group_twists(twists, parameters.grouping)
     for _ in range(parameters.settling_rounds):
@@ -139,7 +142,11 @@ def no_groups() -> BFIFGroups:
 
 
 def _calc_bfifs(
-    frames: BodyFrames, depth_noise: float, focal_length: float, parameters: BFIFParameters
+    frames: BodyFrames,
+    depth_noise: float,
+    focal_length: float,
+    prior: NDArray[np.float64],
+    parameters: BFIFParameters,
 ) -> Twists:
     """Line 5, CalcBFIFs, in the space frame that the parameters ask for."""
     if parameters.space_frame not in ("points", "camera"):
@@ -148,4 +155,4 @@ def _calc_bfifs(
     p_C0S = frames.p_C0Q0[:, 0].mean(0) if at_points else np.zeros(3)
     if parameters.frames.kind == "triplets":
         return triplet_twists(frames, p_C0S)
-    return patch_twists(frames, p_C0S, depth_noise, focal_length)
+    return patch_twists(frames, p_C0S, depth_noise, focal_length, prior)

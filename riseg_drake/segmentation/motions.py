@@ -27,6 +27,10 @@ class MotionParameters:
     still_flow: float = 0.7
     """Pixels (root mean square); a group that moves less than that stands still."""
 
+    tilt: float = 0.03
+    """rad; how much bodies are expected to tilt while they slide (infinite in the paper)."""
+    lift: float = 0.002
+    """m; how much they are expected to rise or sink (infinite in the paper)."""
     misfit_max: float = 3.0
     """A body frame belongs to a motion that explains its points at most so many times worse than its
     own best motion does (mean squared residual)."""
@@ -63,6 +67,7 @@ def group_motions(
     group: NDArray[np.intp],
     depth_noise: float,
     focal_length: float,
+    prior: NDArray | None = None,
 ) -> NDArray[np.float64]:
     """The rigid motion [G, 4, 4] in C0 that fits all points of each group's frames best."""
     motions = []
@@ -75,7 +80,7 @@ def group_motions(
         W = point_precision(q_0, z_1, sigma, depth_noise, focal_length)
         centre = q_0.mean(0)
         everyone = np.ones((1, len(q_0)), bool)
-        V_B, _, _ = fit_motion((q_0 - centre)[None], (q_1 - centre)[None], W[None], everyone)
+        V_B, _, _ = fit_motion((q_0 - centre)[None], (q_1 - centre)[None], W[None], everyone, prior)
         motions.append(translation(centre) @ exp_se3(V_B[0]) @ translation(-centre))
     return np.array(motions).reshape(-1, 4, 4)
 
