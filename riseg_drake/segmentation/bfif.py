@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.geometry.camera import bounding_region
 from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.body_frames import (
@@ -65,7 +66,9 @@ def group_body_frames(
     moving = moving_pixels(pair, expected_flow, optical_flow, above_0.mask, noise, parameters.moving)
     if not moving.any():
         return no_groups()
-    sigma = flow_sigma(smooth_gray(pair.reference.color), noise)
+    region = bounding_region(moving, margin=16)
+    sigma = np.full(moving.shape, np.inf, np.float32)
+    sigma[region] = flow_sigma(smooth_gray(pair.reference.color[region]), noise)
     trusted = moving & (sigma <= noise.flow_max)
     frames = sample_body_frames(pair, optical_flow, trusted, sigma, parameters.frames, rng)
     if len(frames) < parameters.grouping.members_min:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import rays, rays_at
+from riseg_drake.geometry.camera import bounding_region, rays, rays_at
 from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.geometry.se3 import inverse, move_points
 
@@ -143,7 +143,10 @@ def _spread_seeds(good: NDArray[np.bool_], count: int, rng: np.random.Generator)
 
     Even spreading gives a small moving object its frames beside a large one.
     """
-    vu = np.argwhere(good)
+    if not good.any():
+        return np.empty((0, 2), np.intp)
+    region = bounding_region(good)
+    vu = np.argwhere(good[region]) + np.array([region[0].start, region[1].start])
     if len(vu) <= count:
         return vu
     vu = rng.permutation(vu)

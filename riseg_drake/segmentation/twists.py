@@ -149,18 +149,18 @@ def fit_motion(
     """
     K = len(q_0)
     X = np.broadcast_to(np.eye(4), (K, 4, 4))
-    weight = used.astype(float)
     for _ in range(_GAUSS_NEWTON_STEPS):
-        moved = np.einsum("kij,kmj->kmi", X[:, :3, :3], q_0) + X[:, None, :3, 3]
-        residual = q_1 - moved
-        squared = np.einsum("kmi,kmij,kmj->km", residual, W, residual)
+        moved = q_0 @ X[:, :3, :3].swapaxes(1, 2) + X[:, None, :3, 3]
+        residual = (q_1 - moved)[..., None]
+        W_residual = W @ residual
+        squared = (residual * W_residual).sum((-2, -1))
         # Cauchy weights: a point on another body pulls less the less it fits.
         weight = used / (1.0 + squared / _OUTLIER)
         # d(exp(V) q)/dV = [-[q], I]
         J = np.concatenate([-skew(moved), np.broadcast_to(np.eye(3), (*moved.shape[:2], 3, 3))], axis=-1)
-        WJ = (W * weight[..., None, None]) @ J
-        normal = np.einsum("kmia,kmib->kab", J, WJ)
-        rhs = np.einsum("kmia,kmi->ka", WJ, residual)
+        J_W = ((W * weight[..., None, None]) @ J).reshape(K, -1, 6).swapaxes(1, 2)
+        normal = J_W @ J.reshape(K, -1, 6)
+        rhs = (J_W @ residual.reshape(K, -1, 1))[..., 0]
         # A touch of prior keeps patches that are nearly lines solvable; it is far below any data.
         normal = normal + 1e-9 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(6)
         if prior is not None:
