@@ -40,7 +40,7 @@ class BFIFParameters:
     settling_rounds: int = 2
     """How often groups are settled by their fitted motions; 0 leaves Markov clustering the last word,
     as in the paper."""
-    space_frame: str = "points"
+    space_frame: str = field(default="points", metadata={"choices": ("points", "camera")})
     """Where {s} lies: "points" (amid the moving points) or "camera" (C0, as in the paper)."""
 
 

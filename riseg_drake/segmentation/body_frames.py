@@ -4,7 +4,7 @@ A body frame here is a handful of points, given at t-1 and at t, both measured i
 of t-1 (the motion of the camera taken out): `triplets` of the paper, or `patches` of a few dozen.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from riseg_drake.geometry.se3 import inverse, move_points
 class BodyFrameParameters:
     """How body frames are sampled."""
 
-    kind: str = "patches"
+    kind: str = field(default="patches", metadata={"choices": ("patches", "triplets")})
     """"patches" (least squares over many points) or "triplets" (three points, as in the paper)."""
     count: int = 100
     """How many body frames; the paper's n counts sampled pixels and is not given."""

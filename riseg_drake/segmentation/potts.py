@@ -9,7 +9,7 @@ def potts_labels(
     unary: NDArray[np.float64],
     edges: NDArray[np.intp],
     weight: NDArray[np.float64],
-    rounds: int = 20,
+    rounds: int = 30,
 ) -> NDArray[np.intp]:
     """Labels [N] that nearly minimise sum unary[i, x_i] + sum weight[e] [x_i != x_j].
 

@@ -12,11 +12,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import Intrinsics, Region, bounding_region, pixel_grid, project, rays
+from riseg_drake.geometry.camera import Intrinsics, Region, bounding_region, project, rays
 from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.geometry.se3 import inverse
 from riseg_drake.segmentation.association import UNKNOWN
-from riseg_drake.segmentation.expected_flow import flow_of_motion
+from riseg_drake.segmentation.expected_flow import flow_of_motion, where_to
 
 _DEPTH_AGREES = 0.008
 """m; a point and the surface it is looked up on are the same within that (noise, slopes, edges)."""
@@ -156,9 +156,7 @@ def _look_up(
         pair: for depth and intrinsics of C0.
     """
     intrinsics = pair.reference.intrinsics
-    ray = rays(intrinsics)[region]
-    source = pixel_grid(*intrinsics.shape)[region] + flow_of_motion(z_1, X_C0C1, intrinsics, region)
-    z_expected = z_1 * (ray @ X_C0C1[2, :3].astype(np.float32)) + np.float32(X_C0C1[2, 3])
+    source, z_expected = where_to(rays(intrinsics)[region], z_1, X_C0C1, intrinsics)
     found = cv2.remap(label_0, source, None, cv2.INTER_NEAREST, borderValue=0)
     z_0 = cv2.remap(pair.reference.depth, source, None, cv2.INTER_NEAREST, borderValue=0)
     # Where depth has a hole the label alone must do, but any measured agreement is better.

@@ -35,16 +35,16 @@ class SegmentParameters:
 
     noise: MeasurementNoise = field(default_factory=MeasurementNoise)
     motions: MotionParameters = field(default_factory=MotionParameters)
-    outline: str = "motion"
+    outline: str = field(default="motion", metadata={"choices": ("motion", "flow")})
     """"motion" (which motion explains a pixel, motion_labels.py) or "flow" (breadth first search over
     similar flow, as in the paper, growth.py)."""
     labels: MotionLabelParameters = field(default_factory=MotionLabelParameters)
     growth: GrowthParameters = field(default_factory=GrowthParameters)
     association: AssociationParameters = field(default_factory=AssociationParameters)
-    propagation: str = "reference"
+    propagation: str = field(default="reference", metadata={"choices": ("reference", "flow")})
     """"reference" (labels carried from the reference frame by each object's own motion) or "flow"
     (every frame by O_t, in whole pixels, as in the paper)."""
-    ids: str = "evidence"
+    ids: str = field(default="evidence", metadata={"choices": ("evidence", "fresh")})
     """"evidence" (see association.py) or "fresh" (each group a new id, as in the paper)."""
     memory: bool = True
     """Remember objects that leave the view (not in the paper)."""
