@@ -1,7 +1,5 @@
 """A recording put through Alg. 2 once more: the same systems, wired in the same way, without a robot."""
 
-from collections.abc import Iterable, Iterator
-
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.analysis import Simulator
@@ -35,20 +33,6 @@ class Replay:
         self._ticks += 1
         self._simulator.AdvanceTo((self._ticks - 0.5) * self._period)
         return self._diagram.GetOutputPort("mask").Eval(context)
-
-
-def masks_at(
-    replay: Replay, frames: Iterable[RecordedFrame], times: Iterable[float]
-) -> Iterator[tuple[RecordedFrame, NDArray[np.uint16]]]:
-    """The frames taken at some times (s, in rising order, to the microsecond) with their masks."""
-    wanted = [round(time, 6) for time in times]
-    for frame in frames:
-        if not wanted:
-            return
-        mask = replay.mask_after(frame)
-        if round(frame.time, 6) == wanted[0]:
-            wanted.pop(0)
-            yield frame, mask
 
 
 def _fix_inputs(diagram: Diagram, context: Context, frame: RecordedFrame) -> None:

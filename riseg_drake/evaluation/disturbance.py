@@ -112,7 +112,9 @@ def disturbance_of_all(scenes: Sequence[Sequence[Disturbance]]) -> DisturbanceFi
 
 
 def _figures(scenes: Sequence[Sequence[Disturbance]], steps: Iterable[int]) -> DisturbanceFigures:
-    pushed, others, tilts = [], [], []
+    pushed: list[float] = []
+    others: list[float] = []
+    tilts: list[float] = []
     interactions = toppled = left_table = 0
     for i in steps:
         for scene in scenes:
