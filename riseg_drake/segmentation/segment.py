@@ -150,6 +150,8 @@ def segment(
         now = _decide(now, pair, groups, motions, moving, above_0, parameters)
     if parameters.propagation == "flow":
         label = push_by_flow(now.decided, optical_flow)
+        # What no label was carried to (it came into view, or lay between two targets) may yet be found.
+        label = np.where((label == 0) & above_1.mask, UNKNOWN, label)
     elif parameters.propagation == "reference":
         remembered = moved_memory(now.memory, now.motion_of, pair.reference.X_WC)
         drawn = draw_memory(remembered, pair.current)
