@@ -1,0 +1,103 @@
+"""objMask on drawn depth: what stands there is found, and neither the table nor the robot."""
+
+import numpy as np
+import pytest
+
+from riseg_drake.segmentation.above_table import AboveTableParameters, objects_above_table
+from tests.segmentation.drawn_scene import CAMERA, DrawnScene, looking_down, planar
+
+LOW_BOXES = [(0.06, 0.05, 0.015), (0.05, 0.08, 0.015), (0.04, 0.04, 0.05)]
+PLACES = [planar(-0.08, 0.02, 0.4), planar(0.03, 0.02), planar(0.09, -0.06, 1.0)]
+
+
+@pytest.mark.parametrize("tilt", [-0.25, 0.0, 0.25])
+def test_things_of_15_mm_are_found_whole_and_the_table_is_not(tilt: float) -> None:
+    camera = looking_down(y=0.45 * np.tan(tilt), tilt=-tilt)
+    frame, label = DrawnScene(LOW_BOXES).frame(0, camera, PLACES, np.random.default_rng(0))
+    above = objects_above_table(frame, AboveTableParameters())
+    for number in (1, 2, 3):
+        assert np.mean(above.mask[label == number]) > 0.95
+    assert np.mean(above.mask[label == 0]) < 0.001
+
+
+def test_the_plane_and_the_heights_are_those_of_the_world() -> None:
+    frame, label = DrawnScene(LOW_BOXES).frame(0, looking_down(tilt=0.1), PLACES, np.random.default_rng(1))
+    above = objects_above_table(frame, AboveTableParameters())
+    np.testing.assert_allclose(above.plane_W, [0, 0, 1, 0], atol=0.002)
+    assert np.median(above.height[label == 0]) == pytest.approx(0.0, abs=0.001)
+    assert np.median(above.height[label == 2]) == pytest.approx(0.015, abs=0.001)
+
+
+def test_the_robot_stands_above_the_table_and_is_none_of_its_objects() -> None:
+    robot = np.zeros(CAMERA.shape, bool)
+    robot[200:, 100:220] = True
+    robot[100:140, 150:170] = True
+    scene = DrawnScene(LOW_BOXES)
+    frame, label = scene.frame(0, looking_down(), PLACES, np.random.default_rng(2), robot)
+    above = objects_above_table(frame, AboveTableParameters())
+    assert not above.mask[robot].any()
+    assert np.mean(above.mask[label > 0]) > 0.95
+
+
+@pytest.mark.parametrize("noise", [0.0012, 0.0023, 0.004])
+def test_depth_noise_is_read_off_the_table_within_30_percent(noise: float) -> None:
+    scene = DrawnScene(LOW_BOXES, depth_noise=noise)
+    frame, _ = scene.frame(0, looking_down(tilt=0.1), PLACES, np.random.default_rng(3))
+    above = objects_above_table(frame, AboveTableParameters())
+    assert above.depth_noise == pytest.approx(noise, rel=0.3)
+
+
+def test_a_table_that_shows_in_a_third_of_the_image_is_enough() -> None:
+    rng = np.random.default_rng(4)
+    robot = np.zeros(CAMERA.shape, bool)
+    robot[:, 214:] = True
+    frame, label = DrawnScene(LOW_BOXES[:2]).frame(0, looking_down(), PLACES[:2], rng, robot)
+    frame.depth[:, :70] = 0
+    above = objects_above_table(frame, AboveTableParameters())
+    measured = (label > 0) & (frame.depth > 0)
+    assert np.mean(above.mask[measured]) > 0.95
+    assert not above.mask[(label == 0)].any()
+
+
+def test_a_table_packed_with_things_of_many_heights_is_still_the_table() -> None:
+    rng = np.random.default_rng(5)
+    cells = [(x, y) for x in np.arange(-0.18, 0.19, 0.06) for y in np.arange(-0.12, 0.13, 0.06)]
+    sizes = [(0.048, 0.048, height) for height in np.linspace(0.015, 0.08, len(cells))]
+    rng.shuffle(sizes)
+    frame, label = DrawnScene(sizes).frame(0, looking_down(), [planar(*c) for c in cells], rng)
+    assert np.mean(label == 0) < 0.4
+    above = objects_above_table(frame, AboveTableParameters())
+    np.testing.assert_allclose(above.plane_W, [0, 0, 1, 0], atol=0.003)
+    assert np.mean(above.mask[label > 0]) > 0.95
+
+
+def test_pixels_without_depth_are_not_above_the_table_and_have_no_height() -> None:
+    frame, label = DrawnScene(LOW_BOXES).frame(0, looking_down(), PLACES, np.random.default_rng(6))
+    hole = (label == 2) & (np.arange(CAMERA.width) % 40 < 20)
+    frame.depth[hole] = 0
+    above = objects_above_table(frame, AboveTableParameters())
+    assert np.isnan(above.height[hole]).all()
+    assert np.isfinite(above.height[~hole]).all()
+
+
+def test_specks_are_no_objects() -> None:
+    frame, _ = DrawnScene([]).frame(0, looking_down(), [], np.random.default_rng(7))
+    frame.depth[50:52, 60:62] -= 0.03
+    assert not objects_above_table(frame, AboveTableParameters()).mask.any()
+
+
+def test_the_same_frame_gives_the_same_answer() -> None:
+    frame, _ = DrawnScene(LOW_BOXES).frame(0, looking_down(), PLACES, np.random.default_rng(8))
+    first, second = (objects_above_table(frame, AboveTableParameters()) for _ in range(2))
+    np.testing.assert_array_equal(first.mask, second.mask)
+    np.testing.assert_array_equal(first.plane_W, second.plane_W)
+
+
+def test_an_image_without_a_table_is_refused() -> None:
+    frame, _ = DrawnScene([]).frame(0, looking_down(), [])
+    frame.depth[...] = 0
+    with pytest.raises(ValueError, match="no plane"):
+        objects_above_table(frame, AboveTableParameters())
+    frame.depth[...] = np.random.default_rng(9).uniform(0.3, 3.0, CAMERA.shape)
+    with pytest.raises(ValueError, match="no plane"):
+        objects_above_table(frame, AboveTableParameters())
