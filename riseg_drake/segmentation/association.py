@@ -166,7 +166,7 @@ class _Decision:
             return False
         core = cv2.erode(region.astype(np.uint8), self.rim, borderValue=0)
         opened = (cv2.dilate(core, self.rim) > 0) & region
-        return np.count_nonzero(opened) >= max(self.pixels_min, 0.4 * np.count_nonzero(region))
+        return bool(opened.sum() >= max(self.pixels_min, 0.4 * region.sum()))
 
     def _add_piece(self, inside: NDArray[np.bool_], around: Region, g: int) -> None:
         """Keep a new object, given in a rectangle, for `name_pieces`."""

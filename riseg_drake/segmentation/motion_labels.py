@@ -86,7 +86,7 @@ def label_by_motion(
     pixel = (inside[0] + region[0].start, inside[1] + region[1].start)
     cost = motion_costs(pair, pixel, motions, noise, depth_noise, parameters)
     unary = np.stack([np.bincount(of_pixel, c, pieces.count) for c in cost], axis=1)
-    unary /= parameters.correlated_pixels
+    unary = unary / parameters.correlated_pixels
     pixels = np.bincount(of_pixel, minlength=pieces.count)
     weight = parameters.border * pieces.length * np.exp(-pieces.contrast / parameters.contrast)
     label = _fewest_labels(unary, pixels, pieces, weight, parameters)

@@ -122,7 +122,8 @@ def _where_to(pair: FramePair, motion: NDArray, mine: NDArray[np.bool_]) -> Regi
     """The part of the current view in which pixels `mine` [H, W] of the reference view must be sought."""
     if not mine.any():
         return slice(0, 0), slice(0, 0)
-    coarse = tuple(slice(side.start, side.stop, 4) for side in bounding_region(mine))
+    rows, columns = bounding_region(mine)
+    coarse = slice(rows.start, rows.stop, 4), slice(columns.start, columns.stop, 4)
     depth = np.where(mine[coarse], pair.reference.depth[coarse], np.float32(0))
     flow = flow_of_motion(depth, pair.X_C1C0 @ motion, pair.reference.intrinsics, coarse)
     v, u = np.nonzero(np.isfinite(flow[..., 0]))
