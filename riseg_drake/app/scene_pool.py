@@ -64,7 +64,7 @@ def cluster_pool(address: str, work: Work = work_on) -> Pool:
     except ImportError:
         raise ClusterError("--dask needs Dask: pip install 'riseg-drake[dask]'") from None
     try:
-        client = Client(address, timeout=10)
+        client = Client(address, timeout=5)
     except (OSError, ValueError) as error:
         raise ClusterError(f"no Dask scheduler answers at {address} ({type(error).__name__})") from None
 

@@ -12,7 +12,7 @@ from riseg_drake.app.evaluate import evaluate, scene_tasks
 from riseg_drake.app.output import OutputError, RunFolder, Step
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.scene_folder import is_finished, read_result
-from riseg_drake.app.scene_pool import local_pool
+from riseg_drake.app.scene_pool import cluster_pool, local_pool
 from riseg_drake.evaluation.scores import score
 
 LAST_STEP = 2
@@ -146,7 +146,7 @@ def test_a_scene_that_fails_counts_as_what_it_is_and_loses_no_other(tmp_path, sc
     assert scenes_run == [2, 3, 4, 3, 4]
 
 
-def work_in_processes(folder_of_deaths=None):
+def work_in_processes(seed_one_dies=False):
     """Work for child processes, which cannot see what a test replaces here."""
     run = fake_run
 
@@ -159,7 +159,7 @@ def work_in_processes(folder_of_deaths=None):
         from riseg_drake.app.scene_work import SceneOutcome
 
         folder = RunFolder(task.folder, task.settings)
-        if folder_of_deaths is not None and task.seed == 1:
+        if seed_one_dies and task.seed == 1:
             time.sleep(0.5)
             os._exit(9)
         run(Scenario(), task.seed, folder)
@@ -180,7 +180,7 @@ def test_processes_leave_the_same_as_one(tmp_path):
 
 def test_a_process_that_dies_takes_no_other_scene_with_it(tmp_path):
     todo = tasks(tmp_path, 3)
-    outcomes = list(local_pool(2, work_in_processes(folder_of_deaths=True))(todo))
+    outcomes = list(local_pool(2, work_in_processes(seed_one_dies=True))(todo))
     failures = {outcome.task.seed: outcome.failure for outcome in outcomes}
     assert sorted(failures) == [0, 1, 2]
     assert not failures[0]
@@ -188,6 +188,21 @@ def test_a_process_that_dies_takes_no_other_scene_with_it(tmp_path):
     assert "its process died" in failures[1]
     assert "its process died" in read_result(todo[1]).failure
     assert not is_finished(todo[1])
+
+
+def test_a_dask_cluster_sends_back_what_a_scene_leaves(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as cluster:
+        todo = tasks(tmp_path / "cluster", 2)
+        outcomes = list(cluster_pool(cluster.scheduler_address, work_in_processes())(todo))
+    assert {outcome.task for outcome in outcomes} == set(todo)
+    list(local_pool(1, work_in_processes())(tasks(tmp_path / "here", 2)))
+    for path in (tmp_path / "here").rglob("*.png"):
+        there = tmp_path / "cluster" / path.relative_to(tmp_path / "here")
+        assert there.read_bytes() == path.read_bytes()
+    assert len(read_result(todo[1]).scores) == LAST_STEP
 
 
 def test_children_do_not_hear_ctrl_c_and_their_parent_does():
