@@ -122,10 +122,12 @@ def make_diagram(scenario: Scenario, seed: int, meshcat: Meshcat | None = None) 
 
     for name, port in STATION_PORTS.items():
         builder.Connect(station.GetOutputPort(port), segmentation.inputs[name])
-    for name in ("pair", "above_table", "mask"):
+    for name in ("pair", "above_table"):
         builder.Connect(segmentation.outputs[name], planner.GetInputPort(name))
-    for name in ("pair", "mask"):
-        builder.Connect(segmentation.outputs[name], arm.GetInputPort(name))
+    builder.Connect(segmentation.outputs["pair"], arm.GetInputPort("pair"))
+    # Objects in doubt, which may be two, are pushed once more: they are not in the settled mask.
+    for system in (planner, arm):
+        builder.Connect(segmentation.outputs["settled_mask"], system.GetInputPort("mask"))
     builder.Connect(arm.GetOutputPort("position"), planner.GetInputPort("position"))
     builder.Connect(arm.GetOutputPort("tried_pushes"), planner.GetInputPort("tried_pushes"))
     builder.Connect(planner.GetOutputPort("push"), arm.GetInputPort("push"))

@@ -39,7 +39,8 @@ class SegmentationBlock:
     inputs: dict[str, InputPort]
     """The keys of STATION_PORTS."""
     outputs: dict[str, OutputPort]
-    """`pair`, `above_table`, `expected_flow`, `optical_flow`, `groups`, `mask`, `segmentation`."""
+    """`pair`, `above_table`, `expected_flow`, `optical_flow`, `groups`, `mask`, `settled_mask`,
+    `segmentation`."""
 
 
 def add_segmentation(
@@ -78,6 +79,7 @@ def add_segmentation(
         "optical_flow": optical,
         "groups": grouper,
         "mask": propagator,
+        "settled_mask": propagator,
         "segmentation": propagator,
     }
     return SegmentationBlock(

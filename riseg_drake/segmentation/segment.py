@@ -14,6 +14,7 @@ from riseg_drake.segmentation.association import (
     KnownObjects,
     associate,
 )
+from riseg_drake.segmentation.doubt import DoubtParameters, doubtful_ids
 from riseg_drake.segmentation.effective_flow import effective_flow
 from riseg_drake.segmentation.growth import GrowthParameters, grow_by_similar_flow
 from riseg_drake.segmentation.memory import Memory, draw_memory, moved_memory, remember
@@ -46,6 +47,7 @@ class SegmentParameters:
     (every frame by O_t, in whole pixels, as in the paper)."""
     ids: str = field(default="evidence", metadata={"choices": ("evidence", "fresh")})
     """"evidence" (see association.py) or "fresh" (each group a new id, as in the paper)."""
+    doubt: DoubtParameters = field(default_factory=DoubtParameters)
     memory: bool = True
     """Remember objects that leave the view (not in the paper)."""
     episode_gap: float = 0.7
@@ -75,6 +77,8 @@ class Segmentation(Immutable):
     hidden: Memory
     """Points of objects that the frame `sequence` does not see, as of its time."""
     born: dict[int, int]
+    doubtful: frozenset[int]
+    """Ids that may be two objects, see doubt.py."""
     next_id: int
     episode: int
     """Counts the times that something began to move."""
@@ -85,6 +89,12 @@ class Segmentation(Immutable):
     def mask(self) -> NDArray[np.uint16]:
         """L_t [H, W]: object ids, 0 = background."""
         return np.where(self.label == UNKNOWN, np.uint16(0), self.label)
+
+    @property
+    def settled_mask(self) -> NDArray[np.uint16]:
+        """L_t without the objects in doubt: what needs no further push."""
+        mask = self.mask
+        return np.where(np.isin(mask, list(self.doubtful)), np.uint16(0), mask) if self.doubtful else mask
 
     @property
     def object_ids(self) -> tuple[int, ...]:
@@ -106,6 +116,7 @@ def nothing_segmented(shape: tuple[int, int]) -> Segmentation:
         memory={},
         hidden={},
         born={},
+        doubtful=frozenset(),
         next_id=1,
         episode=0,
         last_motion=-np.inf,
@@ -240,20 +251,31 @@ def _decide(
     z = pair.reference.depth[above_0.mask]
     pixels_per_metre = pair.current.intrinsics.fx / float(np.median(z[z > 0]))
     region = bounding_region(now.known.label > 0, margin=1)
+    gaps = motion_gaps(_points(groups, pair, above_0), motions, pair.current.intrinsics.fx)
     association = associate(
         replace(now.known, label=now.known.label[region]),
         moving[region],
         now.decided[region] if now.sequence > now.reference_sequence else None,
-        motion_gaps(_points(groups, pair, above_0), motions, pair.current.intrinsics.fx),
+        gaps,
         now.episode,
         pixels_per_metre,
         parameters.association,
     )
     decided = now.known.label.copy()
     decided[region] = association.label
+    doubtful = doubtful_ids(
+        association.label,
+        association.born,
+        now.episode,
+        {a: float(gaps[0, 1 + g]) for a, g in association.motion_of.items()},
+        now.doubtful,
+        pixels_per_metre,
+        parameters.doubt,
+    )
     return replace(
         now,
         decided=decided,
+        doubtful=doubtful,
         motion_of={a: motions[g] for a, g in association.motion_of.items()},
         born=association.born,
         next_id=max(association.next_id, now.next_id),

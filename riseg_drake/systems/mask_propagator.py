@@ -16,7 +16,8 @@ class MaskPropagator(LeafSystem):
         pair (FramePair or None), expected_flow, optical_flow ([H, W, 2], pixels), groups (BFIFGroups),
         above_table_reference, above_table (AboveTable at t-1 and at t).
     Output ports, as of the last update:
-        mask ([H, W] uint16, L_t, 0 = background), segmentation (Segmentation: the ids, also of objects
+        mask ([H, W] uint16, L_t, 0 = background), settled_mask (the same without the objects that may
+        be two, for whoever plans pushes), segmentation (Segmentation: the ids, also of objects
         out of sight, and where they are remembered).
     """
 
@@ -48,6 +49,12 @@ class MaskPropagator(LeafSystem):
             "mask",
             lambda: AbstractValue.Make(object()),
             lambda context, output: output.set_value(self._segmentation(context).mask),
+            prerequisites_of_calc={self.all_state_ticket()},
+        )
+        self.DeclareAbstractOutputPort(
+            "settled_mask",
+            lambda: AbstractValue.Make(object()),
+            lambda context, output: output.set_value(self._segmentation(context).settled_mask),
             prerequisites_of_calc={self.all_state_ticket()},
         )
         self.DeclareAbstractOutputPort(
