@@ -63,6 +63,34 @@ def _parser() -> argparse.ArgumentParser:
         help="show it in the browser and save the replay as DIR/replay.html (no)",
     )
 
+    evaluate = _add(
+        commands,
+        "evaluate",
+        _evaluate,
+        "Run many scenes, and put their scores into the paper's table and figure.\n"
+        "An evaluation that was stopped goes on where it was when the same command is given again.",
+    )
+    evaluate.add_argument("--scenes", type=_positive, default=20, metavar="N", help="how many (20)")
+    evaluate.add_argument(
+        "--seed",
+        type=int,
+        default=100,
+        metavar="S",
+        help="of the first scene, the others follow (100; the program was developed on 0 to 19)",
+    )
+    evaluate.add_argument("--objects", type=Path, metavar="DIR", help="draw from these SDF or URDF models")
+    evaluate.add_argument("--jobs", type=_positive, default=1, metavar="J", help="scenes at a time (1)")
+    evaluate.add_argument(
+        "--output", type=Path, metavar="DIR", help="output folder (out/evaluate_SCENARIO_seed_S)"
+    )
+    evaluate.add_argument("--scenario", type=Path, metavar="FILE", help="a YAML file (the built-in simulation)")
+    evaluate.add_argument("--dask", metavar="ADDRESS", help="hand the scenes to a running Dask cluster")
+    evaluate.add_argument(
+        "--ablation",
+        action="store_true",
+        help="also record the runs, and segment them as the paper has it, one switch at a time",
+    )
+
     score = _add(
         commands,
         "score",
@@ -107,6 +135,13 @@ def _add(commands, name, call, explanation) -> argparse.ArgumentParser:  # type:
     return command
 
 
+def _positive(text: str) -> int:
+    number = int(text) if text.isdecimal() else 0
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 up")
+    return number
+
+
 def _add_scenario(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "scenario",
@@ -121,6 +156,22 @@ def _run(chosen: argparse.Namespace, console: Console) -> None:
     from riseg_drake.app.run import run_command
 
     run_command(chosen.scenario, chosen.seed, chosen.output, chosen.record, chosen.meshcat, console)
+
+
+def _evaluate(chosen: argparse.Namespace, console: Console) -> None:
+    from riseg_drake.app.evaluate import evaluate_command
+
+    evaluate_command(
+        chosen.scenes,
+        chosen.seed,
+        chosen.objects,
+        chosen.jobs,
+        chosen.output,
+        chosen.scenario,
+        chosen.dask,
+        chosen.ablation,
+        console,
+    )
 
 
 def _score(chosen: argparse.Namespace, console: Console) -> None:
@@ -143,11 +194,22 @@ def _diagram(chosen: argparse.Namespace, console: Console) -> None:
 
 def _mistakes() -> tuple[type[Exception], ...]:
     """The errors that tell a person what to do otherwise; any other is a fault of this program."""
+    from riseg_drake.app.evaluate import EvaluationError
     from riseg_drake.app.graphics import NoGraphicsError
     from riseg_drake.app.output import OutputError
     from riseg_drake.app.scenario_file import ScenarioError
+    from riseg_drake.app.scene_pool import ClusterError
     from riseg_drake.evaluation.label_folders import LabelFolderError
     from riseg_drake.recording.layout import RecordingError
     from riseg_drake.stations.scene import SceneError
 
-    return NoGraphicsError, OutputError, ScenarioError, SceneError, LabelFolderError, RecordingError
+    return (
+        NoGraphicsError,
+        OutputError,
+        ScenarioError,
+        SceneError,
+        LabelFolderError,
+        RecordingError,
+        EvaluationError,
+        ClusterError,
+    )

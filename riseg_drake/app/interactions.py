@@ -10,10 +10,11 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, EventStatus
 
 from riseg_drake.app.diagram import WiredDiagram
-from riseg_drake.app.output import Step, motion_between
+from riseg_drake.app.output import Step
+from riseg_drake.evaluation.disturbance import Disturbance, motion_between, object_at
 from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.rgbd import Frame
-from riseg_drake.pushing.push import ArmPhase
+from riseg_drake.pushing.push import ArmPhase, Push
 from riseg_drake.systems.stage_clock import StageClock
 
 Listener = Callable[[Frame, Context], None]
@@ -118,7 +119,9 @@ class _Book:
     def __init__(self, wired: WiredDiagram, context: Context, clock: StageClock):
         self._wired, self._context, self._clock = wired, context, clock
         self._frames = 0
-        self._poses: dict[str, NDArray] = {}
+        self._start: dict[str, NDArray] | None = None  # poses before the first interaction,
+        self._before: dict[str, NDArray] = {}  # and before the one that is under way,
+        self._pushed: str | None = None  # and what that one pushes
         self._seen: _Seen | None = None
 
     def count(self, frame: Frame, is_at_rest: bool) -> None:
@@ -144,8 +147,17 @@ class _Book:
             stage_seconds={stage: tuple(times) for stage, times in self._clock.seconds.items()},
             ground_truth=ground_truth,
             scores=score(mask, ground_truth),
-            motions=motion_between(self._poses, poses) if self._poses else {},
+            disturbance=None
+            if self._start is None
+            else Disturbance(self._pushed, motion_between(self._start, self._before, poses)),
         )
-        self._frames, self._poses = 0, poses
+        self._start = self._start or poses
+        self._frames, self._before, self._pushed = 0, poses, self._next_pushed(frame, ground_truth)
         self._clock.seconds.clear()
         return step
+
+    def _next_pushed(self, frame: Frame, ground_truth: NDArray[np.uint16]) -> str | None:
+        """The object that the push now beginning goes for."""
+        push: Push | None = self._wired.read("active_push", self._context)
+        object_id = None if push is None else object_at(push.p_WB, frame, ground_truth)
+        return None if object_id is None else self._wired.object_names[object_id]

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.app.overlay import draw_overlay
+from riseg_drake.evaluation.disturbance import Disturbance
 from riseg_drake.evaluation.scores import Scores
 from riseg_drake.recording.whole_file import write_png, write_text
 from riseg_drake.recording.writer import depth_to_millimetres
@@ -31,16 +32,6 @@ REPLAY = "replay.html"
 
 class OutputError(ValueError):
     """Why nothing can be written to an output folder, in one line."""
-
-
-@dataclass(frozen=True)
-class ObjectMotion:
-    """What one interaction did to one object."""
-
-    moved_m: float
-    """Distance between the object's origin before and after, m."""
-    tilted_deg: float
-    """Angle by which the object leans further than before, degrees."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +54,8 @@ class Step:
     ground_truth: NDArray[np.uint16] | None = None
     """[H, W], visible pixels of each object; only in simulation."""
     scores: Scores | None = None
-    motions: Mapping[str, ObjectMotion] = field(default_factory=dict)
-    """By object, since the last step; only in simulation."""
+    disturbance: Disturbance | None = None
+    """What the interaction did to the objects; only in simulation, and not in step 0."""
 
     @property
     def objects(self) -> int:
@@ -83,7 +74,7 @@ class RunFolder:
         self._summary: dict[str, Any] = {**about, "state": "running", "steps": []}
         if folder.exists() and not folder.is_dir():
             raise OutputError(f"{folder} is a file; give a folder for the output")
-        if folder.is_dir() and any(folder.iterdir()) and not (folder / SUMMARY).exists():
+        if folder.is_dir() and not (folder / SUMMARY).exists() and not all(map(_is_own, folder.iterdir())):
             raise OutputError(
                 f"{folder} is not empty and holds no earlier run; give a new folder, or an empty one"
             )
@@ -122,8 +113,13 @@ class RunFolder:
         (self.path / SUMMARY).unlink(missing_ok=True)
         (self.path / REPLAY).unlink(missing_ok=True)
         for entry in self.path.iterdir():
-            if re.fullmatch(rf"\.?step_\d+(\.unfinished)?|{RECORDING}", entry.name) and entry.is_dir():
+            if _is_own(entry):
                 shutil.rmtree(entry)
+
+
+def _is_own(entry: Path) -> bool:
+    """Whether a run made this folder; one that was cut off while it cleared up leaves some of them."""
+    return bool(re.fullmatch(rf"\.?step_\d+(\.unfinished)?|{RECORDING}", entry.name)) and entry.is_dir()
 
 
 def to_json(content: Any) -> str:
@@ -144,18 +140,6 @@ def stage_figures(seconds: Mapping[str, Sequence[float]]) -> dict[str, dict[str,
     }
 
 
-def motion_between(before: Mapping[str, NDArray], after: Mapping[str, NDArray]) -> dict[str, ObjectMotion]:
-    """How far every object moved and tilted between two sets of poses X_WB [4, 4], by its name."""
-    motions = {}
-    for name, X_WB1 in after.items():
-        X_WB0 = before[name]
-        R_up = X_WB1[:3, :3] @ X_WB0[:3, :3].T  # turns the object's old attitude into the new one
-        tilt = math.acos(min(1.0, max(-1.0, R_up[2, 2])))
-        moved = float(np.linalg.norm(X_WB1[:3, 3] - X_WB0[:3, 3]))
-        motions[name] = ObjectMotion(moved, math.degrees(tilt))
-    return motions
-
-
 def _step_to_json(step: Step) -> dict[str, Any]:
     content: dict[str, Any] = {
         "step": step.interaction_step,
@@ -166,8 +150,9 @@ def _step_to_json(step: Step) -> dict[str, Any]:
     }
     if step.scores is not None:
         content["scores"] = step.scores.as_dict()
-    if step.motions:
-        content["motions"] = {name: asdict(motion) for name, motion in step.motions.items()}
+    if step.disturbance is not None:
+        content["pushed"] = step.disturbance.pushed
+        content["motions"] = {name: asdict(motion) for name, motion in step.disturbance.motions.items()}
     return content
 
 

@@ -4,7 +4,7 @@ The protocol is that of Xie et al. (UOIS, CoRL 2019) as Xiang et al. (UCN, CoRL 
 the paper's table and figure are made. Label images are [H, W], integers, 0 = background.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass
 
 import numpy as np
@@ -54,6 +54,12 @@ class Scores:
     def as_dict(self) -> dict[str, float]:
         """The ten figures by their names in the field, see `FIGURES`."""
         return dict(zip(FIGURES, astuple(self), strict=True))
+
+    @classmethod
+    def from_dict(cls, figures: Mapping[str, float | None]) -> "Scores":
+        """The inverse of `as_dict`; None, as JSON spells NaN, is NaN. Raises KeyError."""
+        values = (figures[name] for name in FIGURES)
+        return cls(*(float("nan") if value is None else float(value) for value in values))
 
 
 def score(prediction: NDArray, ground_truth: NDArray) -> Scores:

@@ -48,7 +48,12 @@ class Clustering:
 
 
 def clusterings(
-    p_WQ: NDArray, parameters: ClusteringParameters, rng: np.random.Generator, *, one_first: bool = False
+    p_WQ: NDArray,
+    parameters: ClusteringParameters,
+    rng: np.random.Generator,
+    *,
+    one_first: bool = False,
+    least: int = 1,
 ) -> Iterator[Clustering]:
     """First the clustering that the method chooses, then a few finer ones.
 
@@ -60,6 +65,7 @@ def clusterings(
         parameters: method and its constants.
         rng: subsampling and random starts.
         one_first: begin with a single cluster instead of asking the method.
+        least: begin with no fewer clusters than this, where K-Means or K-Medoids is asked.
 
     Raises:
         ValueError: for a method that does not exist.
@@ -84,7 +90,7 @@ def clusterings(
         inertia = np.empty(largest_k)
         for k in range(1, largest_k + 1):
             fits[k], inertia[k - 1] = fit(sample, k, parameters.restarts, rng)
-        first = elbow(inertia, parameters.elbow)
+        first = min(max(elbow(inertia, parameters.elbow), least), largest_k)
     for k in range(first, min(first + parameters.finer, largest_k) + 1):
         centers = fits[k] if k in fits else fit(sample, k, parameters.restarts, rng)[0]
         yield _by_nearest_center(p_WQ, centers)

@@ -25,9 +25,16 @@ class ClustersParameters:
     """Cluster each piece alone; False clusters all of objsToSegment at once, as the paper does."""
     neck: float = 0.006
     """Where a connection is narrower than this, m, it is cut."""
+    widest_neck: float = 0.030
+    """A piece with a nook is cut even where it is up to this wide, m ..."""
+    smallest_part: float = 4e-4
+    """... but not into parts smaller than this, m^2: legs, tails and fins belong to something."""
     concavity: float = 0.008
     """A piece whose outline nowhere recedes more than this from its convex hull, m, is one cluster:
     where things touch, there mostly is a nook."""
+    least_with_nook: int = 2
+    """A piece with a nook that no neck divides is at least this many clusters: half an object moves as
+    well as a whole one, but two objects pushed together look like one."""
     clustering: ClusteringParameters = field(default_factory=ClusteringParameters)
 
 
@@ -48,16 +55,13 @@ def find_clusters(
     rng: np.random.Generator,
 ) -> Iterator[list[Cluster]]:
     """centers and clusterPoints of objsToSegment; then, if asked again, ever finer ones."""
-    pieces = split_at_necks(to_segment, table, parameters.neck) if parameters.by_piece else [to_segment]
-    divisions = [
-        clusterings(
-            table.points(piece),
-            parameters.clustering,
-            rng,
-            one_first=parameters.by_piece and concavity(piece, table.cell) <= parameters.concavity,
-        )
-        for piece in pieces
-    ]
+    pieces = take_apart(to_segment, table, parameters) if parameters.by_piece else [to_segment]
+    divisions = []
+    for piece in pieces:
+        whole = parameters.by_piece and concavity(piece, table.cell) <= parameters.concavity
+        least = parameters.least_with_nook if parameters.by_piece else 1
+        p_WQ = table.points(piece)
+        divisions.append(clusterings(p_WQ, parameters.clustering, rng, one_first=whole, least=least))
     current: list[Clustering | None] = [None] * len(pieces)
     for _ in count():
         finer = [next(division, None) for division in divisions]
@@ -72,20 +76,55 @@ def find_clusters(
         ]
 
 
-def split_at_necks(mask: NDArray[np.bool_], table: TableMap, neck: float) -> list[NDArray[np.bool_]]:
-    """The connected pieces of a mask, also cut where they hang together by less than `neck` metres."""
+def take_apart(
+    mask: NDArray[np.bool_], table: TableMap, parameters: ClustersParameters
+) -> list[NDArray[np.bool_]]:
+    """The connected pieces of a mask, and those with a nook again cut at their necks, narrow ones first."""
+    pieces = split_at_necks(mask, table, parameters.neck, 0.0)
+    for neck in np.arange(parameters.neck, parameters.widest_neck, 2 * table.cell)[1:]:
+        pieces = [
+            part
+            for piece in pieces
+            for part in (
+                [piece]
+                if concavity(piece, table.cell) <= parameters.concavity
+                else split_at_necks(piece, table, float(neck), parameters.smallest_part)
+            )
+        ]
+    return pieces
+
+
+def split_at_necks(
+    mask: NDArray[np.bool_], table: TableMap, neck: float, smallest: float
+) -> list[NDArray[np.bool_]]:
+    """The connected pieces of a mask, also cut where they hang together by less than `neck` metres.
+
+    What would be smaller than `smallest`, m^2, is a limb rather than a piece and stays where it is.
+    """
     closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     depth_inside = cv2.distanceTransform(closed, cv2.DIST_L2, 5) * table.cell
-    cores = (depth_inside > neck / 2).astype(np.uint8)
-    amount, core_of = cv2.connectedComponents(cores, connectivity=4)
-    if amount <= 1:
-        return [mask] if mask.any() else []
-    # Every cell to the nearest core: distanceTransform numbers the cells of cores, not the cores.
-    _, nearest = cv2.distanceTransformWithLabels(1 - cores, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
-    piece_of_label = np.zeros(nearest.max() + 1, int)
-    piece_of_label[nearest[cores > 0]] = core_of[cores > 0]
-    piece = np.where(mask, piece_of_label[nearest], 0)
-    return [piece == number for number in range(1, amount) if (piece == number).any()]
+    amount, core_of = cv2.connectedComponents((depth_inside > neck / 2).astype(np.uint8), connectivity=4)
+    piece = _by_nearest_core(mask, core_of)
+    area = np.bincount(piece[mask], minlength=amount) * table.cell_area
+    limb = area < smallest
+    if limb[1:].any() and not limb[1:].all():
+        core_of[limb[core_of]] = 0
+        piece = _by_nearest_core(mask, core_of)
+    numbers = np.unique(piece[mask])
+    return [mask & (piece == number) for number in numbers] if len(numbers) > 1 else [mask]
+
+
+def _by_nearest_core(mask: NDArray[np.bool_], core_of: NDArray) -> NDArray[np.int_]:
+    """For each cell of a mask the number (from 1) of the core [rows, columns] nearest to it."""
+    if not core_of.any():
+        return mask.astype(int)
+    # distanceTransform numbers the cells of the cores, not the cores.
+    _, nearest = cv2.distanceTransformWithLabels(
+        (core_of == 0).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    core_of_label = np.zeros(nearest.max() + 1, int)
+    core_of_label[nearest[core_of > 0]] = core_of[core_of > 0]
+    return np.where(mask, core_of_label[nearest], 0)
 
 
 def concavity(piece: NDArray[np.bool_], cell: float) -> float:

@@ -59,20 +59,47 @@ def find_action(
     to_segment = objects_to_segment(table, parameters.to_segment)  # line 3
     if not to_segment.any():  # line 4
         return None  # line 5
-    for clusters in find_clusters(to_segment, table, parameters.clusters, rng):  # line 6
-        largest = max(int(cluster.cells.sum()) for cluster in clusters)
-        pushes: list[Push] = []
-        for cluster in clusters:  # line 8
-            B = boundary(cluster.cells, cluster.center_W, table, parameters.boundary)  # line 7
-            pushes += valid_pushes(B, cluster, table, largest, tried, heading_W, parameters)  # lines 9, 10
-        pushes.sort(key=lambda push: push.cost)
-        for push in pushes[: parameters.paths]:
-            if plan_path is None:
+    rounds = find_clusters(to_segment, table, parameters.clusters, rng)  # line 6
+    divisions = []
+    for clusters in rounds:
+        divisions.append(clusters)
+        push = best_push(clusters, table, tried, heading_W, plan_path, parameters)
+        if push is not None:
+            return push  # lines 11, 12
+    if parameters.validity.l_act_last > parameters.validity.l_act:
+        validity = replace(parameters.validity, l_act=parameters.validity.l_act_last)
+        parameters = replace(parameters, validity=validity)
+        for clusters in divisions:
+            push = best_push(clusters, table, tried, heading_W, plan_path, parameters)
+            if push is not None:
                 return push
-            path = plan_path(push)
-            if path is not None:
-                return replace(push, path=path)  # lines 11, 12
     return None  # line 17
+
+
+def best_push(
+    clusters: Sequence[Cluster],
+    table: TableMap,
+    tried: Sequence[TriedPush],
+    heading_W: NDArray | None,
+    plan_path: Callable[[Push], PushPath | None] | None,
+    parameters: FindActionParameters,
+) -> Push | None:
+    """The best of the valid pushes of all clusters that the arm can do (lines 7 to 12); None if none."""
+    largest = max(int(cluster.cells.sum()) for cluster in clusters)
+    pushes: list[Push] = []
+    for cluster in clusters:  # line 8
+        B = boundary(cluster.cells, cluster.center_W, table, parameters.boundary)  # line 7
+        pushes += valid_pushes(  # lines 9, 10
+            B, cluster, table, largest, tried, heading_W, parameters
+        )
+    pushes.sort(key=lambda push: push.cost)
+    if plan_path is None:
+        return pushes[0] if pushes else None
+    for push in pushes[: parameters.paths]:
+        path = plan_path(push)
+        if path is not None:
+            return replace(push, path=path)
+    return None
 
 
 def valid_pushes(

@@ -152,11 +152,7 @@ class PandaKinematics:
         q = np.asarray(q_start, np.float64)
         for X_WE in path:
             step = self._follow(X_WE, q)
-            if (
-                step is None
-                or not PANDA_LIMITS.contains(step, margin)
-                or self.clearance(step) < min_clearance
-            ):
+            if step is None or not PANDA_LIMITS.contains(step, margin) or self.clearance(step) < min_clearance:
                 return None
             q = step
             traced.append(q)
@@ -184,9 +180,7 @@ class PandaKinematics:
 def pose_error(X_WA: NDArray, X_WB: NDArray) -> NDArray[np.float64]:
     """The small twist [omega; p] [6] in W that carries A onto B, to first order in the angle."""
     R_AB_W = X_WB[:3, :3] @ X_WA[:3, :3].T
-    twisting = np.array(
-        [R_AB_W[2, 1] - R_AB_W[1, 2], R_AB_W[0, 2] - R_AB_W[2, 0], R_AB_W[1, 0] - R_AB_W[0, 1]]
-    )
+    twisting = np.array([R_AB_W[2, 1] - R_AB_W[1, 2], R_AB_W[0, 2] - R_AB_W[2, 0], R_AB_W[1, 0] - R_AB_W[0, 1]])
     return np.concatenate([twisting / 2, X_WB[:3, 3] - X_WA[:3, 3]])
 
 

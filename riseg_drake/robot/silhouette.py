@@ -66,9 +66,7 @@ class RobotSilhouette:
         z = p_CQ[:, 2]
         uv = np.stack([p_CQ[:, 0] / z * k.fx + k.cx, p_CQ[:, 1] / z * k.fy + k.cy], axis=-1)
         margin = self._margin_px
-        if (uv.max(axis=0) < -margin).any() or (
-            uv.min(axis=0) > (k.width + margin, k.height + margin)
-        ).any():
+        if (uv.max(axis=0) < -margin).any() or (uv.min(axis=0) > (k.width + margin, k.height + margin)).any():
             return
         # Far outside the picture a coordinate would overflow; out there only its direction counts.
         uv = np.clip(uv, -20 * k.width, 20 * k.width)

@@ -19,6 +19,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.geometry.camera import Region
+
 UNKNOWN = np.uint16(65535)
 """Label of pixels above the table that no object has claimed yet; never leaves the propagator."""
 
@@ -128,8 +130,8 @@ class _Decision:
                 continue
             if motion_gap[g, main] < self.parameters.split_flow:
                 continue
-            part = self._solid(inside & (moving == g))
-            if part is None:
+            part = inside & (moving == g)
+            if not self._is_solid(part):
                 continue
             if self.born[a] == self.episode and g == 0:
                 # It was found in this very episode, and too much of it: give the rest back.
@@ -139,30 +141,38 @@ class _Decision:
 
     def place_unknown(self, g: int, region: NDArray[np.bool_]) -> None:
         """Whose the unknown pixels are that move with group g - 1."""
-        if np.count_nonzero(region) == 0:
-            return
-        count, piece = cv2.connectedComponents(region.astype(np.uint8), connectivity=4)
+        count, piece, stats, _ = cv2.connectedComponentsWithStats(region.astype(np.uint8), connectivity=4)
         companions = [a for a, motion in self.motion_of.items() if motion == g - 1]
+        reach = self.rim.shape[0]
         for number in range(1, count):
-            inside = piece == number
+            # Around the piece only: there may be many, and most are specks.
+            u, v, width, height, area = stats[number]
+            around = (slice(max(0, v - reach), v + height + reach), slice(max(0, u - reach), u + width + reach))
+            inside = piece[around] == number
             near = cv2.dilate(inside.astype(np.uint8), self.rim) > 0
-            touching = [a for a in companions if np.any(self.known.label[near] == a)]
+            neighbours = set(np.unique(self.known.label[around][near]).tolist())
+            touching = [a for a in companions if a in neighbours]
             young = [a for a in touching if self.born[a] == self.episode]
-            solid = self._solid(inside)
             if young:
-                self.label[inside] = young[0]
-            elif solid is not None:
-                self.pieces.append((solid, g))
+                self.label[around][inside] = young[0]
+            elif area >= self.pixels_min and self._is_solid(inside):
+                self._add_piece(inside, around, g)
             elif touching:
-                self.label[inside] = touching[0]
+                self.label[around][inside] = touching[0]
 
-    def _solid(self, region: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
-        """The region without its thin parts, or None if little is left: a rim, or too small."""
+    def _is_solid(self, region: NDArray[np.bool_]) -> bool:
+        """Whether a region is more than a rim, and large enough."""
+        if np.count_nonzero(region) < self.pixels_min:
+            return False
         core = cv2.erode(region.astype(np.uint8), self.rim, borderValue=0)
         opened = (cv2.dilate(core, self.rim) > 0) & region
-        if np.count_nonzero(opened) < max(self.pixels_min, 0.4 * np.count_nonzero(region)):
-            return None
-        return region
+        return bool(opened.sum() >= max(self.pixels_min, 0.4 * region.sum()))
+
+    def _add_piece(self, inside: NDArray[np.bool_], around: Region, g: int) -> None:
+        """Keep a new object, given in a rectangle, for `name_pieces`."""
+        whole = np.zeros(self.label.shape, bool)
+        whole[around] = inside
+        self.pieces.append((whole, g))
 
     def name_pieces(self) -> None:
         """Label the new objects: by the ids of the frame before where they are the same pieces."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.geometry.camera import bounding_region
 from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.body_frames import (
@@ -24,7 +25,7 @@ from riseg_drake.segmentation.motions import (
     settle_groups,
 )
 from riseg_drake.segmentation.noise import MeasurementNoise, flow_sigma, smooth_gray
-from riseg_drake.segmentation.twists import Twists, patch_twists, triplet_twists
+from riseg_drake.segmentation.twists import Twists, patch_twists, sliding_prior, triplet_twists
 
 
 @dataclass
@@ -39,7 +40,7 @@ class BFIFParameters:
     settling_rounds: int = 2
     """How often groups are settled by their fitted motions; 0 leaves Markov clustering the last word,
     as in the paper."""
-    space_frame: str = "points"
+    space_frame: str = field(default="points", metadata={"choices": ("points", "camera")})
     """Where {s} lies: "points" (amid the moving points) or "camera" (C0, as in the paper)."""
 
 
@@ -65,14 +66,18 @@ def group_body_frames(
     moving = moving_pixels(pair, expected_flow, optical_flow, above_0.mask, noise, parameters.moving)
     if not moving.any():
         return no_groups()
-    sigma = flow_sigma(smooth_gray(pair.reference.color), noise)
+    region = bounding_region(moving, margin=16)
+    sigma = np.full(moving.shape, np.inf, np.float32)
+    sigma[region] = flow_sigma(smooth_gray(pair.reference.color[region]), noise)
     trusted = moving & (sigma <= noise.flow_max)
     frames = sample_body_frames(pair, optical_flow, trusted, sigma, parameters.frames, rng)
     if len(frames) < parameters.grouping.members_min:
         return no_groups()
-    twists = _calc_bfifs(frames, above_0.depth_noise, focal_length, parameters)
+    normal_C0 = pair.reference.X_WC[:3, :3].T @ above_0.plane_W[:3]
+    prior = sliding_prior(normal_C0, parameters.motions.tilt, parameters.motions.lift)
+    twists = _calc_bfifs(frames, above_0.depth_noise, focal_length, prior, parameters)
     frames, twists = _on_one_body(frames, twists, parameters.motions.misfit_max)
-    group, motions = _settled_groups(frames, twists, above_0.depth_noise, focal_length, parameters)
+    group, motions = _settled_groups(frames, twists, above_0.depth_noise, focal_length, prior, parameters)
     seeds = frames.p_C0Q0[:, 0]
     spans = [flow_difference(seeds[group == g], X, np.eye(4), focal_length) for g, X in enumerate(motions)]
     return BFIFGroups(
@@ -101,6 +106,7 @@ def _settled_groups(
     twists: Twists,
     depth_noise: float,
     focal_length: float,
+    prior: NDArray[np.float64],
     parameters: BFIFParameters,
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """Line 6, GroupBFIFs: the group of each frame, and the groups' motions.
@@ -110,7 +116,7 @@ def _settled_groups(
     """
 
     def fit(group: NDArray[np.intp]) -> NDArray[np.float64]:
-        return group_motions(frames, group, depth_noise, focal_length)
+        return group_motions(frames, group, depth_noise, focal_length, prior)
 
     group = group_twists(twists, parameters.grouping)
     for _ in range(parameters.settling_rounds):
@@ -139,7 +145,11 @@ def no_groups() -> BFIFGroups:
 
 
 def _calc_bfifs(
-    frames: BodyFrames, depth_noise: float, focal_length: float, parameters: BFIFParameters
+    frames: BodyFrames,
+    depth_noise: float,
+    focal_length: float,
+    prior: NDArray[np.float64],
+    parameters: BFIFParameters,
 ) -> Twists:
     """Line 5, CalcBFIFs, in the space frame that the parameters ask for."""
     if parameters.space_frame not in ("points", "camera"):
@@ -148,4 +158,4 @@ def _calc_bfifs(
     p_C0S = frames.p_C0Q0[:, 0].mean(0) if at_points else np.zeros(3)
     if parameters.frames.kind == "triplets":
         return triplet_twists(frames, p_C0S)
-    return patch_twists(frames, p_C0S, depth_noise, focal_length)
+    return patch_twists(frames, p_C0S, depth_noise, focal_length, prior)

@@ -4,12 +4,12 @@ A body frame here is a handful of points, given at t-1 and at t, both measured i
 of t-1 (the motion of the camera taken out): `triplets` of the paper, or `patches` of a few dozen.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import rays, rays_at
+from riseg_drake.geometry.camera import bounding_region, rays, rays_at
 from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.geometry.se3 import inverse, move_points
 
@@ -18,7 +18,7 @@ from riseg_drake.geometry.se3 import inverse, move_points
 class BodyFrameParameters:
     """How body frames are sampled."""
 
-    kind: str = "patches"
+    kind: str = field(default="patches", metadata={"choices": ("patches", "triplets")})
     """"patches" (least squares over many points) or "triplets" (three points, as in the paper)."""
     count: int = 100
     """How many body frames; the paper's n counts sampled pixels and is not given."""
@@ -143,7 +143,10 @@ def _spread_seeds(good: NDArray[np.bool_], count: int, rng: np.random.Generator)
 
     Even spreading gives a small moving object its frames beside a large one.
     """
-    vu = np.argwhere(good)
+    if not good.any():
+        return np.empty((0, 2), np.intp)
+    region = bounding_region(good)
+    vu = np.argwhere(good[region]) + np.array([region[0].start, region[1].start])
     if len(vu) <= count:
         return vu
     vu = rng.permutation(vu)

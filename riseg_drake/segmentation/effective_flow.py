@@ -58,7 +58,7 @@ def moving_pixels(
     region = bounding_region(above_0, margin=window)
     X_t = effective_flow(optical_flow[region], expected_flow[region])
     with np.errstate(invalid="ignore"):
-        candidate = above_0[region] & ((X_t**2).sum(-1) > parameters.flow_min**2)
+        candidate = above_0[region] & (X_t[..., 0] ** 2 + X_t[..., 1] ** 2 > parameters.flow_min**2)
     if np.count_nonzero(candidate) < pixels_min:
         return moving
     evidence = zero_motion_evidence(pair, expected_flow, optical_flow, region, noise, window)

@@ -5,7 +5,7 @@ that differ little are told apart only when both have gone some way. So the refe
 things move, and is renewed when the pair spans enough, or when nothing moves and the camera goes on.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from riseg_drake.geometry.se3 import log_se3
 class FramePairParameters:
     """How far apart the two frames of a pair may be."""
 
-    kind: str = "motion"
+    kind: str = field(default="motion", metadata={"choices": ("motion", "consecutive")})
     """"motion" or, as in the paper, "consecutive"."""
     flow_span: float = 20.0
     """Effective flow, pixels, after which the reference is renewed."""

@@ -1,6 +1,6 @@
 """Alg. 2, line 6: body frames with equal twists, by Mahalanobis distance and Markov clustering."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from riseg_drake.segmentation.twists import Twists
 class GroupingParameters:
     """How twists become groups. The paper names the methods and no figures."""
 
-    covariance: str = "propagated"
+    covariance: str = field(default="propagated", metadata={"choices": ("propagated", "sample")})
     """"propagated" (each pair of twists with their own covariances) or "sample" (one for all, as the
     paper's Mahalanobis distance is usually read)."""
     kernel_width: float = 2.5

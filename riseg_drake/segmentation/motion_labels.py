@@ -12,9 +12,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import Region, bounding_region, pixel_grid, rays
-from riseg_drake.geometry.rgbd import FramePair, unhidden_depth
-from riseg_drake.segmentation.expected_flow import flow_of_motion
+from riseg_drake.geometry.camera import Region, bounding_region, rays
+from riseg_drake.geometry.rgbd import Frame, FramePair, unhidden_depth
+from riseg_drake.segmentation.above_table import AboveTable
+from riseg_drake.segmentation.expected_flow import where_to
 from riseg_drake.segmentation.noise import (
     MeasurementNoise,
     depth_sigma,
@@ -23,6 +24,9 @@ from riseg_drake.segmentation.noise import (
 )
 from riseg_drake.segmentation.potts import potts_labels
 from riseg_drake.segmentation.superpixels import Superpixels, superpixels
+
+_ROW = 256
+"""Pixels are handed to OpenCV in rows of so many: it wants images, and none longer than 32767."""
 
 
 @dataclass
@@ -43,10 +47,20 @@ class MotionLabelParameters:
     """A motion must explain the pixels it wins so much better, on average, than any single other one."""
 
 
+def cut_pieces(
+    reference: Frame, above_0: AboveTable, parameters: MotionLabelParameters
+) -> tuple[Region, Superpixels]:
+    """The pieces of the reference frame that decide as one, in the region of all that stands there."""
+    region = bounding_region(above_0.mask)
+    z = float(np.median(reference.depth[above_0.mask]))
+    size = max(3, round(parameters.piece * reference.intrinsics.fx / max(z, 1e-3)))
+    return region, superpixels(reference.color[region], above_0.height[region], above_0.mask[region], size)
+
+
 def label_by_motion(
     pair: FramePair,
-    above_0: NDArray[np.bool_],
-    height_0: NDArray[np.float32],
+    region: Region,
+    pieces: Superpixels,
     motions: NDArray[np.float64],
     noise: MeasurementNoise,
     depth_noise: float,
@@ -54,25 +68,29 @@ def label_by_motion(
 ) -> NDArray[np.int16]:
     """Give each pixel above the table, at t-1, to the motion that explains it best.
 
+    Args:
+        pair: the frames of t-1 and t.
+        region: the part of the view of t-1 that `pieces` are of.
+        pieces: of the frame of t-1.
+        motions: [G, 4, 4] in C0.
+        noise: of the images.
+        depth_noise: standard deviation of depth at 1 m, m.
+        parameters: see there.
+
     Returns:
-        [H, W], 1 + number of the motion; 0 for what stands still and for the table. What the images
-        leave open is filled from its surroundings, along edges of colour.
+        [H, W], 1 + number of the motion; 0 for what stands still and for the table.
     """
-    out = np.zeros(above_0.shape, np.int16)
-    if not len(motions) or not above_0.any():
-        return out
-    region = bounding_region(above_0)
-    cost = motion_costs(pair, region, motions, noise, depth_noise, parameters)
-    z = float(np.median(pair.reference.depth[above_0]))
-    size = max(3, round(parameters.piece * pair.current.intrinsics.fx / max(z, 1e-3)))
-    pieces = superpixels(pair.reference.color[region], height_0[region], above_0[region], size)
-    inside = pieces.label >= 0
+    out = np.zeros(pair.reference.depth.shape, np.int16)
+    inside = np.nonzero(pieces.label >= 0)
     of_pixel = pieces.label[inside]
-    unary = np.stack([np.bincount(of_pixel, c[inside], pieces.count) for c in cost], axis=1)
-    unary /= parameters.correlated_pixels
+    pixel = (inside[0] + region[0].start, inside[1] + region[1].start)
+    cost = motion_costs(pair, pixel, motions, noise, depth_noise, parameters)
+    unary = np.stack([np.bincount(of_pixel, c, pieces.count) for c in cost], axis=1)
+    unary = unary / parameters.correlated_pixels
+    pixels = np.bincount(of_pixel, minlength=pieces.count)
     weight = parameters.border * pieces.length * np.exp(-pieces.contrast / parameters.contrast)
-    label = _fewest_labels(unary, np.bincount(of_pixel, minlength=pieces.count), pieces, weight, parameters)
-    out[region][inside] = label[of_pixel]
+    label = _fewest_labels(unary, pixels, pieces, weight, parameters)
+    out[pixel] = label[of_pixel]
     return out
 
 
@@ -107,36 +125,37 @@ def _fewest_labels(
 
 def motion_costs(
     pair: FramePair,
-    region: Region,
+    pixel: tuple[NDArray[np.intp], NDArray[np.intp]],
     motions: NDArray[np.float64],
     noise: MeasurementNoise,
     depth_noise: float,
     parameters: MotionLabelParameters,
 ) -> NDArray[np.float32]:
-    """How badly standing still and each motion [G, 4, 4] explain each pixel of a region, [1 + G, h, w].
+    """How badly standing still and each motion [G, 4, 4] explain N pixels (v, u) of t-1, [1 + G, N].
 
     Squared residuals of gray value and of depth, normalised by their noise: 1 + 1 where a motion is
     right, up to `cost_max` each where it is wrong.
     """
     reference, current = pair.reference, pair.current
     intrinsics = current.intrinsics
-    I_0, gray_1 = smooth_gray(reference.color[region]), smooth_gray(current.color)
-    variance = gray_variance(I_0, noise)
-    depth = reference.depth[region]
+    count = len(pixel[0])
+    rows = tuple(np.resize(index, (-(-count // _ROW), _ROW)) for index in pixel)
+    gray_0, gray_1 = smooth_gray(reference.color), smooth_gray(current.color)
+    I_0, variance = gray_0[rows], gray_variance(gray_0, noise)[rows]
+    depth, ray = reference.depth[rows], rays(intrinsics)[rows]
     depth_1, robot_1 = unhidden_depth(current), current.robot.astype(np.uint8)
-    ray = rays(intrinsics)[region]
-    uv = pixel_grid(*intrinsics.shape)[region]
-    cost = []
-    for motion in (np.eye(4), *motions):
-        X = pair.X_C1C0 @ motion
-        target = uv + flow_of_motion(reference.depth, X, intrinsics, region)
+    cost_max = np.float32(parameters.cost_max)
+    cost = np.empty((1 + len(motions), count), np.float32)
+    for k, motion in enumerate((np.eye(4), *motions)):
+        target, z_expected = where_to(ray, depth, pair.X_C1C0 @ motion, intrinsics)
         I_1 = cv2.remap(gray_1, target, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         z_1 = cv2.remap(depth_1, target, None, cv2.INTER_NEAREST, borderValue=0)
         hidden = cv2.remap(robot_1, target, None, cv2.INTER_NEAREST, borderValue=1) > 0
-        z_expected = depth * (ray @ X[2, :3].astype(np.float32)) + np.float32(X[2, 3])
-        photometric = np.minimum((I_1 - I_0) ** 2 / variance, parameters.cost_max)
-        squared = (z_1 - z_expected) ** 2 / (2 * depth_sigma(z_expected, depth_noise) ** 2)
-        geometric = np.where(z_1 > 0, np.minimum(squared, parameters.cost_max), 1.0)
+        photometric = np.minimum((I_1 - I_0) ** 2 / variance, cost_max)
+        sigma = depth_sigma(z_expected, np.sqrt(2) * depth_noise)
+        geometric = np.minimum(((z_1 - z_expected) / sigma) ** 2, cost_max)
+        both = photometric + np.where(z_1 > 0, geometric, np.float32(1))
         # What cannot be compared speaks neither for nor against: the value expected of a match.
-        cost.append(np.where(hidden | (depth <= 0), 2.0, photometric + geometric))
-    return np.nan_to_num(np.stack(cost).astype(np.float32), nan=2.0)
+        both[hidden | ~np.isfinite(both)] = 2.0
+        cost[k] = both.ravel()[:count]
+    return cost

@@ -13,7 +13,7 @@ from riseg_drake.segmentation.twists import fit_motion, point_precision
 
 _AHEAD = np.array([[0.0, 0.0, 0.4], [0.05, 0.0, 0.4], [0.0, 0.05, 0.4]])
 """Points to compare motions by, m, where there are no others."""
-_POINTS_MAX = 400
+_POINTS_MAX = 200
 """A motion of six numbers needs no more points than that."""
 
 
@@ -27,6 +27,10 @@ class MotionParameters:
     still_flow: float = 0.7
     """Pixels (root mean square); a group that moves less than that stands still."""
 
+    tilt: float = 0.03
+    """rad; how much bodies are expected to tilt while they slide (infinite in the paper)."""
+    lift: float = 0.002
+    """m; how much they are expected to rise or sink (infinite in the paper)."""
     misfit_max: float = 3.0
     """A body frame belongs to a motion that explains its points at most so many times worse than its
     own best motion does (mean squared residual)."""
@@ -63,21 +67,25 @@ def group_motions(
     group: NDArray[np.intp],
     depth_noise: float,
     focal_length: float,
+    prior: NDArray | None = None,
 ) -> NDArray[np.float64]:
     """The rigid motion [G, 4, 4] in C0 that fits all points of each group's frames best."""
-    motions = []
-    for g in range(group.max(initial=-1) + 1):
-        used = frames.used & (group == g)[:, None]
-        stride = max(1, int(used.sum() // _POINTS_MAX))
-        q_0, q_1, z_1, sigma = (
-            a[used][::stride] for a in (frames.p_C0Q0, frames.p_C0Q1, frames.depth_1, frames.flow_sigma)
-        )
-        W = point_precision(q_0, z_1, sigma, depth_noise, focal_length)
-        centre = q_0.mean(0)
-        everyone = np.ones((1, len(q_0)), bool)
-        V_B, _, _ = fit_motion((q_0 - centre)[None], (q_1 - centre)[None], W[None], everyone)
-        motions.append(translation(centre) @ exp_se3(V_B[0]) @ translation(-centre))
-    return np.array(motions).reshape(-1, 4, 4)
+    G = int(group.max(initial=-1)) + 1
+    if G == 0:
+        return np.empty((0, 4, 4))
+    q_0, q_1 = np.zeros((2, G, _POINTS_MAX, 3))
+    z_1, sigma, used = np.ones((3, G, _POINTS_MAX))
+    for g in range(G):
+        mine = np.argwhere(frames.used & (group == g)[:, None])
+        k, m = mine[:: -(-len(mine) // _POINTS_MAX)].T
+        n = len(k)
+        q_0[g, :n], q_1[g, :n] = frames.p_C0Q0[k, m], frames.p_C0Q1[k, m]
+        z_1[g, :n], sigma[g, :n] = frames.depth_1[k, m], frames.flow_sigma[k, m]
+        used[g, n:] = 0
+    W = point_precision(q_0, z_1, sigma, depth_noise, focal_length)
+    centre = q_0.sum(1) / used.sum(1)[:, None]
+    V_B, _, _ = fit_motion(q_0 - centre[:, None], q_1 - centre[:, None], W, used > 0, prior)
+    return translation(centre) @ exp_se3(V_B) @ translation(-centre)
 
 
 def misfits(

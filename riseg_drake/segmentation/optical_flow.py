@@ -4,7 +4,7 @@ Any method serves that follows the protocol `FlowMethod`; the paper uses RAFT an
 may stand in. Dense inverse search (DIS, OpenCV) is the default here: it needs no weights and no GPU.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import cv2
@@ -30,7 +30,7 @@ class FlowMethod(Protocol):
 class DisFlowParameters:
     """Dense inverse search (Kroeger et al. 2016), as OpenCV has it."""
 
-    preset: str = "medium"
+    preset: str = field(default="medium", metadata={"choices": tuple(DIS_PRESETS)})
     """"ultrafast", "fast" or "medium": 2, 3 and 14 ms at 640x480 on two cores."""
 
 

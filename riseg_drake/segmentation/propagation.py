@@ -12,10 +12,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import Intrinsics, bounding_region, project, rays
-from riseg_drake.geometry.rgbd import Frame, FramePair
-from riseg_drake.geometry.se3 import inverse, move_points
+from riseg_drake.geometry.camera import Intrinsics, Region, bounding_region, project, rays
+from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.geometry.se3 import inverse
 from riseg_drake.segmentation.association import UNKNOWN
+from riseg_drake.segmentation.expected_flow import flow_of_motion, where_to
 
 _DEPTH_AGREES = 0.008
 """m; a point and the surface it is looked up on are the same within that (noise, slopes, edges)."""
@@ -44,30 +45,31 @@ def carry_labels(
         [H, W], ids, UNKNOWN or 0: every pixel above the table has a label, no other has one.
     """
     current = pair.current
-    vu = np.nonzero(above_1)
-    z_1 = current.depth[vu]
-    p_C1Q = rays(current.intrinsics)[vu] * z_1[:, None]
-    label = np.zeros(len(z_1), np.uint16)
-    gap = np.full(len(z_1), _DEPTH_AGREES, np.float32)
-    X_C0C1 = inverse(pair.X_C1C0)
+    if not above_1.any():
+        return np.zeros(above_1.shape, np.uint16)
+    everywhere = bounding_region(above_1)
+    label = np.zeros(above_1.shape, np.uint16)
+    gap = np.full(above_1.shape, _DEPTH_AGREES, np.float32)
+    z_1 = np.where(above_1, current.depth, np.float32(0))
 
     still = np.ones(65536, bool)
     still[[0, *motion_of]] = False
     for ids, motion in _by_motion(motion_of):
-        p_C0Q = move_points(inverse(motion) @ X_C0C1, p_C1Q)
-        found, apart = _look_up(p_C0Q, label_0, pair.reference)
-        moves = np.zeros(65536, bool)
-        moves[ids] = True
-        agrees = moves[found] if ids else still[found]
-        better = (z_1 > 0) & agrees & (apart < gap)
-        label[better] = found[better]
-        gap[better] = apart[better]
+        region, moves = everywhere, still
+        if ids:
+            moves = np.zeros(65536, bool)
+            moves[ids] = True
+            region = _where_to(pair, motion, moves[label_0])
+        found, apart = _look_up(z_1[region], inverse(pair.X_C1C0 @ motion), region, label_0, pair)
+        better = (apart < gap[region]) & moves[found]
+        label[region][better] = found[better]
+        gap[region][better] = apart[better]
 
-    out = np.zeros(above_1.shape, np.uint16)
-    out[vu] = label
+    out = label
     lost = above_1 & (out == 0) & (remembered_1 > 0)
     out[lost] = remembered_1[lost]
-    reach = _REACH * current.intrinsics.fx / float(np.median(z_1[z_1 > 0])) if (z_1 > 0).any() else 0.0
+    seen = z_1[everywhere][above_1[everywhere]]
+    reach = _REACH * current.intrinsics.fx / max(float(np.median(seen)), 1e-3)
     return nearest_label(out, above_1, reach)
 
 
@@ -98,7 +100,8 @@ def pixels_of(p_CQ: NDArray, intrinsics: Intrinsics) -> tuple[NDArray[np.intp], 
     """Nearest pixels (v, u) [N, 2] of points [N, 3], and which of them lie in the image."""
     uv = project(p_CQ, intrinsics)
     vu = np.rint(np.nan_to_num(uv[:, ::-1], nan=-1.0)).astype(np.intp)
-    inside = (vu >= 0).all(1) & (vu[:, 0] < intrinsics.height) & (vu[:, 1] < intrinsics.width)
+    v, u = vu.T
+    inside = (v >= 0) & (u >= 0) & (v < intrinsics.height) & (u < intrinsics.width)
     return vu, inside
 
 
@@ -115,16 +118,48 @@ def _by_motion(motion_of: Mapping[int, NDArray]) -> list[tuple[list[int], NDArra
     return groups
 
 
+def _where_to(pair: FramePair, motion: NDArray, mine: NDArray[np.bool_]) -> Region:
+    """The part of the current view in which pixels `mine` [H, W] of the reference view must be sought."""
+    if not mine.any():
+        return slice(0, 0), slice(0, 0)
+    rows, columns = bounding_region(mine)
+    coarse = slice(rows.start, rows.stop, 4), slice(columns.start, columns.stop, 4)
+    depth = np.where(mine[coarse], pair.reference.depth[coarse], np.float32(0))
+    flow = flow_of_motion(depth, pair.X_C1C0 @ motion, pair.reference.intrinsics, coarse)
+    v, u = np.nonzero(np.isfinite(flow[..., 0]))
+    if not len(v):
+        return slice(0, 0), slice(0, 0)
+    spans = []
+    for start, index, shift, size in (
+        (coarse[0].start, v, flow[v, u, 1], mine.shape[0]),
+        (coarse[1].start, u, flow[v, u, 0], mine.shape[1]),
+    ):
+        place = start + 4 * index + shift
+        low, high = np.clip([place.min() - 8, place.max() + 9], 0, size).astype(int)
+        spans.append(slice(int(low), int(high)))
+    return spans[0], spans[1]
+
+
 def _look_up(
-    p_CQ: NDArray, label: NDArray[np.uint16], frame: Frame
+    z_1: NDArray[np.float32],
+    X_C0C1: NDArray[np.float64],
+    region: Region,
+    label_0: NDArray[np.uint16],
+    pair: FramePair,
 ) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
-    """Label at each point's pixel, and how far (m) the surface seen there is from the point."""
-    vu, inside = pixels_of(p_CQ, frame.intrinsics)
-    found = np.zeros(len(p_CQ), np.uint16)
-    apart = np.full(len(p_CQ), np.inf, np.float32)
-    v, u = vu[inside, 0], vu[inside, 1]
-    found[inside] = label[v, u]
-    z_0 = frame.depth[v, u]
+    """Where the points of a region of C1 were in C0: the label there, and how far (m) the surface is.
+
+    Args:
+        z_1: [h, w], depth in the region, 0 = leave out.
+        X_C0C1: [4, 4], takes the points back.
+        region: the part of C1.
+        label_0: [H, W], labels in C0.
+        pair: for depth and intrinsics of C0.
+    """
+    intrinsics = pair.reference.intrinsics
+    source, z_expected = where_to(rays(intrinsics)[region], z_1, X_C0C1, intrinsics)
+    found = cv2.remap(label_0, source, None, cv2.INTER_NEAREST, borderValue=0)
+    z_0 = cv2.remap(pair.reference.depth, source, None, cv2.INTER_NEAREST, borderValue=0)
     # Where depth has a hole the label alone must do, but any measured agreement is better.
-    apart[inside] = np.where(z_0 > 0, np.abs(z_0 - p_CQ[inside, 2]), 0.99 * _DEPTH_AGREES)
-    return found, apart
+    apart = np.where(z_0 > 0, np.abs(z_0 - z_expected), np.float32(0.99 * _DEPTH_AGREES))
+    return np.where(z_1 > 0, found, np.uint16(0)), apart

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import back_project, bounding_region, pixel_grid
+from riseg_drake.geometry.camera import Region, back_project, bounding_region, pixel_grid
 from riseg_drake.geometry.rgbd import FramePair, Immutable
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.association import (
@@ -17,7 +17,7 @@ from riseg_drake.segmentation.association import (
 from riseg_drake.segmentation.effective_flow import effective_flow
 from riseg_drake.segmentation.growth import GrowthParameters, grow_by_similar_flow
 from riseg_drake.segmentation.memory import Memory, draw_memory, moved_memory, remember
-from riseg_drake.segmentation.motion_labels import MotionLabelParameters, label_by_motion
+from riseg_drake.segmentation.motion_labels import MotionLabelParameters, cut_pieces, label_by_motion
 from riseg_drake.segmentation.motions import (
     BFIFGroups,
     MotionParameters,
@@ -26,6 +26,7 @@ from riseg_drake.segmentation.motions import (
 )
 from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.propagation import carry_labels
+from riseg_drake.segmentation.superpixels import Superpixels
 
 
 @dataclass
@@ -34,16 +35,16 @@ class SegmentParameters:
 
     noise: MeasurementNoise = field(default_factory=MeasurementNoise)
     motions: MotionParameters = field(default_factory=MotionParameters)
-    outline: str = "motion"
+    outline: str = field(default="motion", metadata={"choices": ("motion", "flow")})
     """"motion" (which motion explains a pixel, motion_labels.py) or "flow" (breadth first search over
     similar flow, as in the paper, growth.py)."""
     labels: MotionLabelParameters = field(default_factory=MotionLabelParameters)
     growth: GrowthParameters = field(default_factory=GrowthParameters)
     association: AssociationParameters = field(default_factory=AssociationParameters)
-    propagation: str = "reference"
+    propagation: str = field(default="reference", metadata={"choices": ("reference", "flow")})
     """"reference" (labels carried from the reference frame by each object's own motion) or "flow"
     (every frame by O_t, in whole pixels, as in the paper)."""
-    ids: str = "evidence"
+    ids: str = field(default="evidence", metadata={"choices": ("evidence", "fresh")})
     """"evidence" (see association.py) or "fresh" (each group a new id, as in the paper)."""
     memory: bool = True
     """Remember objects that leave the view (not in the paper)."""
@@ -63,6 +64,8 @@ class Segmentation(Immutable):
     """Number of the reference frame that the next fields belong to."""
     known: KnownObjects
     """What was known at the reference frame, before the motion since then."""
+    pieces: tuple[Region, Superpixels] | None
+    """The reference frame cut into pieces, once something has moved in it."""
     decided: NDArray[np.uint16]
     """[H, W], labels at the reference frame in the light of the motion since then."""
     motion_of: dict[int, NDArray[np.float64]]
@@ -97,6 +100,7 @@ def nothing_segmented(shape: tuple[int, int]) -> Segmentation:
         label=empty,
         reference_sequence=-1,
         known=KnownObjects(empty, {}, 1),
+        pieces=None,
         decided=empty,
         motion_of={},
         memory={},
@@ -139,10 +143,15 @@ def segment(
     motions = with_earlier_motions(
         groups, now.motion_of.values(), pair.current.intrinsics.fx, parameters.motions
     )
-    moving = _grow(pair, expected_flow, optical_flow, groups, motions, above_0, parameters)
-    now = _decide(now, pair, groups, motions, moving, above_0, parameters)
+    if len(motions) and above_0.mask.any():
+        if parameters.outline == "motion" and now.pieces is None:
+            now = replace(now, pieces=cut_pieces(pair.reference, above_0, parameters.labels))
+        moving = _grow(now, pair, expected_flow, optical_flow, groups, motions, above_0, parameters)
+        now = _decide(now, pair, groups, motions, moving, above_0, parameters)
     if parameters.propagation == "flow":
         label = push_by_flow(now.decided, optical_flow)
+        # What no label was carried to (it came into view, or lay between two targets) may yet be found.
+        label = np.where((label == 0) & above_1.mask, UNKNOWN, label)
     elif parameters.propagation == "reference":
         remembered = moved_memory(now.memory, now.motion_of, pair.reference.X_WC)
         drawn = draw_memory(remembered, pair.current)
@@ -178,6 +187,7 @@ def _renew_reference(
         before,
         reference_sequence=pair.reference.sequence,
         known=KnownObjects(label, before.born, before.next_id),
+        pieces=None,
         decided=label,
         motion_of={},
         memory=before.hidden,
@@ -185,6 +195,7 @@ def _renew_reference(
 
 
 def _grow(
+    now: Segmentation,
     pair: FramePair,
     expected_flow: NDArray[np.float32],
     optical_flow: NDArray[np.float32],
@@ -194,15 +205,9 @@ def _grow(
     parameters: SegmentParameters,
 ) -> NDArray[np.int16]:
     """Line 7's growth from seeds to pixels, in the view of t-1: 1 + motion, 0 = stands still."""
-    if parameters.outline == "motion":
+    if now.pieces is not None:
         return label_by_motion(
-            pair,
-            above_0.mask,
-            above_0.height,
-            motions,
-            parameters.noise,
-            above_0.depth_noise,
-            parameters.labels,
+            pair, *now.pieces, motions, parameters.noise, above_0.depth_noise, parameters.labels
         )
     if parameters.outline != "flow":
         raise ValueError(f"no outline {parameters.outline!r}: choose motion or flow")
@@ -222,8 +227,6 @@ def _decide(
     parameters: SegmentParameters,
 ) -> Segmentation:
     """Labels at the reference frame in the light of what moves."""
-    if not len(motions) or not now.known.label.any():
-        return replace(now, decided=now.known.label, motion_of={})
     if parameters.ids == "fresh":
         fresh = np.where(moving > 0, moving + (now.next_id - 1), 0).astype(np.uint16)
         ids = [int(a) for a in np.unique(fresh[fresh > 0])]

@@ -75,7 +75,13 @@ def triplet_twists(frames: BodyFrames, p_C0S: NDArray) -> Twists:
     return Twists(V_S, np.broadcast_to(sample, (K, 6, 6)), p_C0S, np.ones(K))
 
 
-def patch_twists(frames: BodyFrames, p_C0S: NDArray, depth_noise: float, focal_length: float) -> Twists:
+def patch_twists(
+    frames: BodyFrames,
+    p_C0S: NDArray,
+    depth_noise: float,
+    focal_length: float,
+    prior: NDArray | None = None,
+) -> Twists:
     """BFIFs of patches by weighted least squares, each with its own covariance.
 
     Args:
@@ -83,11 +89,12 @@ def patch_twists(frames: BodyFrames, p_C0S: NDArray, depth_noise: float, focal_l
         p_C0S: [3], where the space frame lies.
         depth_noise: standard deviation of depth at 1 m, m.
         focal_length: pixels.
+        prior: [6, 6], what is known of a twist before (see `sliding_prior`); nothing if None.
     """
     W = point_precision(frames.p_C0Q0, frames.depth_1, frames.flow_sigma, depth_noise, focal_length)
     centre = (frames.p_C0Q0 * frames.used[..., None]).sum(1) / frames.used.sum(1)[:, None]
     q_0, q_1 = (p - centre[:, None] for p in (frames.p_C0Q0, frames.p_C0Q1))
-    V_B, covariance, misfit = fit_motion(q_0, q_1, W, frames.used)
+    V_B, covariance, misfit = fit_motion(q_0, q_1, W, frames.used, prior)
     V_S, covariance = change_space_frame(V_B, covariance, centre - p_C0S)
     return Twists(V_S, covariance, p_C0S, misfit)
 
@@ -105,8 +112,27 @@ def point_precision(
     )
 
 
+def sliding_prior(normal_C0: NDArray, tilt: float, lift: float) -> NDArray[np.float64]:
+    """Inverse covariance [6, 6] of a twist about a body's own centre, of a body that slides on a table.
+
+    Args:
+        normal_C0: [3], the table's unit normal.
+        tilt: standard deviation of turning about axes in the table, rad.
+        lift: standard deviation of moving along the normal, m.
+    """
+    n = normal_C0[:, None] @ normal_C0[None]
+    prior = np.zeros((6, 6))
+    prior[:3, :3] = (np.eye(3) - n) / tilt**2
+    prior[3:, 3:] = n / lift**2
+    return prior
+
+
 def fit_motion(
-    q_0: NDArray, q_1: NDArray, W: NDArray, used: NDArray[np.bool_]
+    q_0: NDArray,
+    q_1: NDArray,
+    W: NDArray,
+    used: NDArray[np.bool_],
+    prior: NDArray | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Motions V with q_1 = exp(V) q_0, by robust Gauss-Newton; a stack of K fits at once.
 
@@ -115,6 +141,7 @@ def fit_motion(
         q_1: [K, M, 3], points before and after, m, best given about their own centre.
         W: [K, M, 3, 3], inverse covariance of the displacements.
         used: [K, M], which points take part.
+        prior: [6, 6], inverse covariance of the motions before anything is measured; none if None.
 
     Returns:
         V [K, 6]; its covariance [K, 6, 6], enlarged where the points disagree more than W allows;
@@ -122,20 +149,23 @@ def fit_motion(
     """
     K = len(q_0)
     X = np.broadcast_to(np.eye(4), (K, 4, 4))
-    weight = used.astype(float)
     for _ in range(_GAUSS_NEWTON_STEPS):
-        moved = np.einsum("kij,kmj->kmi", X[:, :3, :3], q_0) + X[:, None, :3, 3]
-        residual = q_1 - moved
-        squared = np.einsum("kmi,kmij,kmj->km", residual, W, residual)
+        moved = q_0 @ X[:, :3, :3].swapaxes(1, 2) + X[:, None, :3, 3]
+        residual = (q_1 - moved)[..., None]
+        W_residual = W @ residual
+        squared = (residual * W_residual).sum((-2, -1))
         # Cauchy weights: a point on another body pulls less the less it fits.
         weight = used / (1.0 + squared / _OUTLIER)
         # d(exp(V) q)/dV = [-[q], I]
         J = np.concatenate([-skew(moved), np.broadcast_to(np.eye(3), (*moved.shape[:2], 3, 3))], axis=-1)
-        WJ = (W * weight[..., None, None]) @ J
-        normal = np.einsum("kmia,kmib->kab", J, WJ)
-        rhs = np.einsum("kmia,kmi->ka", WJ, residual)
+        J_W = ((W * weight[..., None, None]) @ J).reshape(K, -1, 6).swapaxes(1, 2)
+        normal = J_W @ J.reshape(K, -1, 6)
+        rhs = (J_W @ residual.reshape(K, -1, 1))[..., 0]
         # A touch of prior keeps patches that are nearly lines solvable; it is far below any data.
         normal = normal + 1e-9 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(6)
+        if prior is not None:
+            normal = normal + prior
+            rhs = rhs - log_se3(X) @ prior
         step = np.linalg.solve(normal, rhs[..., None])[..., 0]
         X = exp_se3(step) @ X
     misfit = (squared * weight).sum(1) / np.maximum(3.0 * weight.sum(1), 1e-9)

@@ -3,9 +3,8 @@ import json
 import cv2
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
-from riseg_drake.app.output import OutputError, RunFolder, Step, motion_between, stage_figures
+from riseg_drake.app.output import OutputError, RunFolder, Step, stage_figures
 from riseg_drake.evaluation.scores import FIGURES, score
 
 
@@ -98,19 +97,6 @@ def test_a_folder_that_holds_something_else_is_refused(tmp_path):
 def test_what_json_does_not_have_becomes_null(tmp_path):
     RunFolder(tmp_path, {"figure": float("nan")})
     assert summary(tmp_path)["figure"] is None
-
-
-def test_turning_on_the_table_is_no_tilt_and_leaning_is():
-    X_WB0 = np.eye(4)
-    X_WB0[:3, :3] = Rotation.from_euler("xyz", [0.3, -0.2, 1.0]).as_matrix()
-    turned, leaning = X_WB0.copy(), X_WB0.copy()
-    turned[:3, :3] = Rotation.from_euler("z", 1.2).as_matrix() @ X_WB0[:3, :3]
-    turned[:2, 3] += [0.03, 0.04]
-    leaning[:3, :3] = Rotation.from_euler("y", 10, degrees=True).as_matrix() @ X_WB0[:3, :3]
-    motions = motion_between({"a": X_WB0, "b": X_WB0}, {"a": turned, "b": leaning})
-    assert motions["a"].moved_m == pytest.approx(0.05)
-    assert motions["a"].tilted_deg == pytest.approx(0, abs=1e-5)
-    assert motions["b"].tilted_deg == pytest.approx(10)
 
 
 def test_stages_that_were_not_called_have_no_figures():

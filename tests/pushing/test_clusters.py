@@ -1,7 +1,13 @@
 import numpy as np
 import pytest
 
-from riseg_drake.pushing.clusters import ClustersParameters, concavity, find_clusters, split_at_necks
+from riseg_drake.pushing.clusters import (
+    ClustersParameters,
+    concavity,
+    find_clusters,
+    split_at_necks,
+    take_apart,
+)
 
 
 def first_clusters(table, **parameters):
@@ -20,12 +26,12 @@ def test_separate_things_are_a_cluster_each_however_different_in_size(drawn):
 def test_things_that_touch_in_a_corner_are_cut_there(drawn):
     drawn.box(0.48, -0.02, 0.04, 0.04).box(0.5195, 0.0195, 0.04, 0.04)
     table = drawn.map()
-    assert len(split_at_necks(table.objects, table, neck=0.006)) == 2
+    assert len(split_at_necks(table.objects, table, neck=0.006, smallest=0.0)) == 2
 
 
 def test_things_that_touch_along_a_face_are_told_apart_by_the_elbow(drawn):
     table = drawn.box(0.475, 0.01, 0.05, 0.04).box(0.525, -0.01, 0.05, 0.04).map()
-    assert len(split_at_necks(table.objects, table, neck=0.006)) == 1
+    assert len(split_at_necks(table.objects, table, neck=0.006, smallest=0.0)) == 1
     x = sorted(cluster.center_W[0] for cluster in first_clusters(table))
     assert x == pytest.approx([0.475, 0.525], abs=0.004)
 
@@ -53,3 +59,29 @@ def test_ring_gets_finer_until_the_centers_lie_on_it(drawn):
     on_ring = [all(table.lookup(table.objects, c.center_W) for c in clusters) for clusters in rounds]
     assert not on_ring[0]
     assert on_ring[-1]
+
+
+def test_heap_of_touching_things_is_taken_apart(drawn):
+    places = [(0.45, 0.0, 0.03), (0.505, 0.0, 0.027), (0.475, 0.05, 0.03), (0.53, 0.05, 0.028)]
+    for x, y, radius in places:
+        drawn.disc(x, y, radius)
+    centers = np.array([cluster.center_W for cluster in first_clusters(drawn.map())])
+    distance = np.linalg.norm(np.array(places)[:, None, :2] - centers, axis=-1)
+    assert distance.shape == (4, 4)
+    assert (distance.min(axis=1) < 0.008).all()
+
+
+def test_limbs_stay_with_their_body(drawn):
+    drawn.box(0.5, 0.0, 0.07, 0.04)
+    for x in (0.472, 0.528):
+        drawn.box(x, -0.03, 0.012, 0.03)
+    table = drawn.map()
+    assert len(take_apart(table.objects, table, ClustersParameters())) == 1
+
+
+def test_piece_with_a_nook_that_nothing_divides_is_at_least_two_clusters(drawn):
+    table = drawn.disc(0.5, 0.0, 0.05).disc(0.55, 0.0, 0.025).box(0.5, -0.05, 0.07, 0.05).map()
+    if len(take_apart(table.objects, table, ClustersParameters())) > 1:
+        pytest.fail("the drawing has a neck; it should not")
+    assert concavity(table.objects, table.cell) > ClustersParameters().concavity
+    assert len(first_clusters(table)) >= 2

@@ -61,6 +61,17 @@ def test_two_things_that_touch_are_pushed_across_their_contact(drawn):
     assert abs(push.direction_W[0]) < 0.6 or (push.center_W[0] - 0.5) * push.direction_W[0] > 0
 
 
+def test_wedged_in_object_is_pushed_after_all_unless_the_paper_is_taken_literally(drawn):
+    drawn.box(0.5, 0.0, 0.04, 0.04)
+    drawn.box(0.535, 0.0, 0.02, 0.03, segmented=True).box(0.5, 0.031, 0.038, 0.02, segmented=True)
+    drawn.box(0.465, 0.01, 0.02, 0.06, segmented=True)
+    table = drawn.box(0.53, 0.03, 0.02, 0.02, segmented=True).map()
+    literal = FindActionParameters()
+    literal.validity.l_act_last = literal.validity.l_act
+    assert act(table, parameters=literal) is None
+    assert act(table) is not None
+
+
 def test_same_seed_gives_the_same_push(drawn):
     table = cluttered(drawn).map()
     first, second = act(table, seed=4), act(table, seed=4)

@@ -128,9 +128,7 @@ class DrawnScene:
         rng: np.random.Generator | None = None,
     ) -> tuple[FramePair, NDArray[np.uint16], NDArray[np.uint16]]:
         """Two frames as a pair, and the true labels of both."""
-        (frame_0, label_0), (frame_1, label_1) = (
-            self.frame(n, X_WCs[n], X_WBs[n], rng) for n in (0, 1)
-        )
+        (frame_0, label_0), (frame_1, label_1) = (self.frame(n, X_WCs[n], X_WBs[n], rng) for n in (0, 1))
         return FramePair(frame_0, frame_1), label_0, label_1
 
 

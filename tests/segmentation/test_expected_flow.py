@@ -60,4 +60,4 @@ def test_the_flow_of_a_region_is_the_same_as_there_in_the_whole() -> None:
     X = RigidTransform(RollPitchYaw(0.1, 0, 0.2), [0.1, 0, 0]).GetAsMatrix4()
     region = (slice(5, 20), slice(7, 60))
     whole = flow_of_motion(depth, X, CAMERA)
-    np.testing.assert_array_equal(flow_of_motion(depth, X, CAMERA, region), whole[region])
+    np.testing.assert_array_equal(flow_of_motion(depth[region], X, CAMERA, region), whole[region])

@@ -37,5 +37,5 @@ def test_the_same_images_give_the_same_flow_to_the_bit() -> None:
 
 
 def test_an_unknown_preset_is_refused_with_the_choices() -> None:
-    with pytest.raises(ValueError, match="'best'.*ultrafast, fast, medium"):
+    with pytest.raises(ValueError, match=r"'best'.*ultrafast, fast, medium"):
         DisFlow(DisFlowParameters(preset="best"))

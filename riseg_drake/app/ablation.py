@@ -1,0 +1,103 @@
+"""The literal paper against this project's version: recorded runs segmented again, one switch at a time."""
+
+import copy
+import operator
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from pathlib import Path
+from typing import Any
+
+from riseg_drake.app.replay import Replay
+from riseg_drake.app.scenario import Scenario
+from riseg_drake.evaluation.scores import Scores, score
+from riseg_drake.recording.layout import RecordedFrame, RecordingError
+from riseg_drake.recording.reader import RecordingReader
+from riseg_drake.robot.kinematics import PandaKinematics
+
+Switch = Mapping[str, Any]
+"""Keys of the scenario and what the paper has there."""
+
+SWITCHES: dict[str, Switch] = {
+    "body frames: triplets, not patches": {"bfif.frames.kind": "triplets"},
+    "covariance: of the sample, not propagated": {"bfif.grouping.covariance": "sample"},
+    "grouping: Markov clustering has the last word": {"bfif.settling_rounds": 0},
+    "space frame: the camera, not amid the points": {"bfif.space_frame": "camera"},
+    "pair: consecutive frames, not by motion": {"frame_pair.kind": "consecutive"},
+    "outline: growth over similar flow, not by motion": {"segment.outline": "flow"},
+    "propagation: every frame by O_t, not from the reference": {"segment.propagation": "flow"},
+    "association: fresh ids, not by evidence": {"segment.ids": "fresh"},
+    "memory of what left the view: none": {"segment.memory": False},
+}
+"""Where this project departs from the paper, by what the report calls it."""
+
+LITERAL = "everything as in the paper"
+
+
+@dataclass(frozen=True)
+class Ablation:
+    """What became of one recorded run with every version."""
+
+    scores: dict[str, list[Scores]]
+    """After each step of the run; fewer where the version failed on the way."""
+    failures: dict[str, str]
+    """Why, in one line, for the versions that failed."""
+
+
+def versions() -> dict[str, Switch]:
+    """All that are compared with this project's version: each switch alone, and all together."""
+    return {**SWITCHES, LITERAL: reduce(operator.or_, SWITCHES.values(), {})}
+
+
+def switched(scenario: Scenario, switch: Switch) -> Scenario:
+    """A copy of a scenario with some of its keys (`bfif.frames.kind`) set otherwise."""
+    other = copy.deepcopy(scenario)
+    for path, value in switch.items():
+        *rooms, key = path.split(".")
+        room = reduce(getattr, rooms, other)
+        if not hasattr(room, key):
+            raise ValueError(f"a scenario has no key {path!r}")
+        setattr(room, key, value)
+    return other
+
+
+def ablate(scenario: Scenario, seed: int, recording: Path, times: Sequence[float]) -> "Ablation":
+    """Segment a recording with every version and score the masks at some times.
+
+    Args:
+        scenario: of the recorded run.
+        seed: of the recorded run.
+        recording: its folder, with joint angles and true labels.
+        times: of the frames to score, s, in rising order: the steps of the run.
+    """
+    kinematics = PandaKinematics(scenario.station.panda)
+    replays = {
+        name: Replay(switched(scenario, switch), kinematics, seed) for name, switch in versions().items()
+    }
+    scores: dict[str, list[Scores]] = {name: [] for name in replays}
+    failures: dict[str, str] = {}
+    wanted = [round(time, 6) for time in times]
+    for frame in RecordingReader(recording):
+        if not wanted:
+            break
+        counts = round(frame.time, 6) == wanted[0]
+        for name in list(replays):
+            try:
+                mask = replays[name].mask_after(frame)
+            except (ValueError, RuntimeError, ArithmeticError) as error:
+                failures[name] = " ".join(str(error).split())
+                del replays[name]
+                continue
+            if counts:
+                scores[name].append(score(mask, _labels(frame, recording)))
+        if counts:
+            wanted.pop(0)
+    if wanted:
+        raise RecordingError(f"{recording} has no frame at {wanted[0]} s")
+    return Ablation(scores, failures)
+
+
+def _labels(frame: RecordedFrame, recording: Path) -> Any:
+    if frame.labels is None:
+        raise RecordingError(f"{recording} has no true labels at {frame.time} s")
+    return frame.labels

@@ -1,0 +1,126 @@
+"""Many scenes at once: in processes of this machine, or on a Dask cluster. The scene is the unit of work."""
+
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Protocol
+
+from joblib import Parallel, cpu_count, delayed, parallel_config
+from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+from riseg_drake.app.output import RECORDING
+from riseg_drake.app.scene_folder import SceneTask, has_begun, note_death
+from riseg_drake.app.scene_work import SceneOutcome, work_on
+from riseg_drake.recording.whole_file import write_bytes
+
+Work = Callable[[SceneTask], SceneOutcome]
+
+
+class ClusterError(ValueError):
+    """Why a Dask cluster cannot be used, in one line."""
+
+
+class Pool(Protocol):
+    """Does the work on scenes, in any order, and gives the outcome of each as soon as it is there."""
+
+    def __call__(self, tasks: Sequence[SceneTask]) -> Iterator[SceneOutcome]:
+        """Work on all of them."""
+
+
+def local_pool(jobs: int, work: Work = work_on) -> Pool:
+    """A pool of `jobs` processes, each with its share of the threads; with one job, this very process."""
+    if jobs == 1:
+        return lambda tasks: map(work, [replace(task, threads=cpu_count()) for task in tasks])
+
+    def outcomes(tasks: Sequence[SceneTask]) -> Iterator[SceneOutcome]:
+        threads = max(1, cpu_count() // jobs)
+        left = {task.folder: replace(task, threads=threads) for task in tasks}
+        while left:
+            try:
+                for outcome in _parallel(_Deaf(work), list(left.values()), jobs):
+                    del left[outcome.task.folder]
+                    yield outcome
+            except TerminatedWorkerError:
+                # One process died (of the graphics driver, or for want of memory) and took its fellows
+                # with it. Which one is found by trying again, one at a time, what they had begun.
+                for task in [task for task in left.values() if has_begun(task)]:
+                    del left[task.folder]
+                    yield _alone(task, work)
+
+    return outcomes
+
+
+def cluster_pool(address: str, work: Work = work_on) -> Pool:
+    """A running Dask cluster. Its workers need riseg_drake installed, but none of our folders.
+
+    Raises ClusterError if Dask is not installed or nobody answers at the address.
+    """
+    try:
+        from distributed import Client
+    except ImportError:
+        raise ClusterError("--dask needs Dask: pip install 'riseg-drake[dask]'") from None
+    try:
+        client = Client(address, timeout=10)
+    except (OSError, ValueError) as error:
+        raise ClusterError(f"no Dask scheduler answers at {address} ({type(error).__name__})") from None
+
+    def outcomes(tasks: Sequence[SceneTask]) -> Iterator[SceneOutcome]:
+        with client, parallel_config(backend="dask"):
+            scenes = Parallel(return_as="generator_unordered", batch_size=1)(
+                delayed(_work_away)(task, work) for task in tasks
+            )
+            folders = {task.folder: task for task in tasks}
+            with closing(scenes):
+                for folder, outcome, files in scenes:
+                    for name, content in files.items():
+                        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+                        write_bytes(folder / name, content)
+                    yield replace(outcome, task=folders[folder])
+
+    return outcomes
+
+
+class _Deaf:
+    """Work that does not hear Ctrl-C: it is the parent's to end its processes."""
+
+    def __init__(self, work: Work):
+        self._work = work
+
+    def __call__(self, task: SceneTask) -> SceneOutcome:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        return self._work(task)
+
+
+def _parallel(work: Work, tasks: Sequence[SceneTask], jobs: int) -> Iterator[SceneOutcome]:
+    with parallel_config(backend="loky", n_jobs=jobs, inner_max_num_threads=tasks[0].threads):
+        outcomes = Parallel(return_as="generator_unordered", batch_size=1)(
+            delayed(work)(task) for task in tasks
+        )
+        with closing(outcomes):  # ends the processes, too, if nobody wants the rest
+            yield from outcomes
+
+
+def _alone(task: SceneTask, work: Work) -> SceneOutcome:
+    try:
+        (outcome,) = _parallel(_Deaf(work), [task], jobs=2)  # with one job it would not be a process apart
+    except TerminatedWorkerError:
+        failure = "its process died; it was out of memory, or the renderer broke"
+        note_death(task, failure)
+        return SceneOutcome(task, failure, seconds=0.0)
+    return outcome
+
+
+def _work_away(task: SceneTask, work: Work) -> tuple[Path, SceneOutcome, dict[str, bytes]]:
+    """Work on another machine: in a folder of its own, of which all but the recording comes back."""
+    with TemporaryDirectory() as place:
+        folder = Path(place) / task.folder.name
+        outcome = work(replace(task, folder=folder))
+        files = {
+            str(path.relative_to(folder)): path.read_bytes()
+            for path in sorted(folder.rglob("*"))
+            if path.is_file() and RECORDING not in path.relative_to(folder).parts
+        }
+    return task.folder, outcome, files

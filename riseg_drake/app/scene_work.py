@@ -1,0 +1,100 @@
+"""The work on one scene of an evaluation: all that one process does."""
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from time import perf_counter
+
+import cv2
+from threadpoolctl import threadpool_limits
+
+from riseg_drake.app.ablation import ablate
+from riseg_drake.app.output import RECORDING, SUMMARY, RunFolder, to_json
+from riseg_drake.app.run import run
+from riseg_drake.app.scenario import Scenario
+from riseg_drake.app.scenario_file import parse_scenario
+from riseg_drake.app.scene_baselines import score_baselines
+from riseg_drake.app.scene_folder import (
+    ABLATION_FILE,
+    BASELINE_FILE,
+    SceneTask,
+    ablation_is_finished,
+    read_json,
+    run_is_usable,
+)
+from riseg_drake.evaluation.baselines import BASELINES
+from riseg_drake.evaluation.scores import Scores
+from riseg_drake.recording.whole_file import write_text
+
+
+@dataclass(frozen=True)
+class SceneOutcome:
+    """What the process that worked on a scene has to say."""
+
+    task: SceneTask
+    failure: str
+    """In one line; empty if all went well."""
+    seconds: float
+
+
+def work_on(task: SceneTask) -> SceneOutcome:
+    """Do what is missing of a scene. Any error is the scene's failure and is returned, not raised."""
+    start = perf_counter()
+    scenario = parse_scenario(task.scenario, Scenario, source=task.scenario_name)
+    failure = ""
+    with limited_threads(task.threads):
+        try:
+            if not run_is_usable(task):
+                _run(task, scenario)
+        except Exception as error:  # whatever it is, the other scenes go on
+            failure = _one_line(error)
+        try:
+            _score_others(task, scenario)
+        except Exception as error:
+            failure = failure or _one_line(error)
+    return SceneOutcome(task, failure, perf_counter() - start)
+
+
+@contextmanager
+def limited_threads(threads: int) -> Iterator[None]:
+    """Give drawing and images so many threads, and linear algebra one.
+
+    Sums of numbers come out differently, in their last bits, with the number of threads that share them;
+    images do not.
+    """
+    before = cv2.getNumThreads()
+    os.environ.setdefault("LP_NUM_THREADS", str(threads))  # Mesa's software renderer
+    cv2.setNumThreads(threads)
+    try:
+        with threadpool_limits(1):
+            yield
+    finally:
+        cv2.setNumThreads(before)
+
+
+def _run(task: SceneTask, scenario: Scenario) -> None:
+    for name in (BASELINE_FILE, ABLATION_FILE):
+        (task.folder / name).unlink(missing_ok=True)
+    run(scenario, task.seed, RunFolder(task.folder, task.settings), record=task.ablation)
+
+
+def _score_others(task: SceneTask, scenario: Scenario) -> None:
+    """The scores of the baselines and, if asked for, of the other versions, for the steps there are."""
+    steps = read_json(task.folder / SUMMARY).get("steps", [])
+    if set(read_json(task.folder / BASELINE_FILE)) != set(BASELINES):
+        baselines = score_baselines(scenario, task.folder, len(steps))
+        write_text(task.folder / BASELINE_FILE, to_json(_scores_to_json(baselines)))
+    if task.ablation and steps and not ablation_is_finished(task):
+        times = [step["time_s"] for step in steps]
+        ablation = ablate(scenario, task.seed, task.folder / RECORDING, times)
+        content = {"scores": _scores_to_json(ablation.scores), "failures": ablation.failures}
+        write_text(task.folder / ABLATION_FILE, to_json(content))
+
+
+def _scores_to_json(scores: Mapping[str, Sequence[Scores]]) -> dict[str, list[dict[str, float]]]:
+    return {name: [each.as_dict() for each in steps] for name, steps in scores.items()}
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__

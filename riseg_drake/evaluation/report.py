@@ -1,0 +1,211 @@
+"""The report of an evaluation, in Markdown: the paper's table with ours in it, and what else was seen."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from math import isnan
+
+import numpy as np
+
+from riseg_drake.evaluation.disturbance import (
+    TOPPLED_DEG,
+    DisturbanceFigures,
+    disturbance_of_all,
+    disturbance_of_steps,
+)
+from riseg_drake.evaluation.published import PUBLISHED
+from riseg_drake.evaluation.scene_result import OURS, SceneResult, scores_by_method, scores_by_switch
+from riseg_drake.evaluation.scores import FOUND_ABOVE_F, Scores
+from riseg_drake.evaluation.step_means import carried, step_means
+
+FIGURE_FILE = "figure.png"
+
+_HEAD = ("Overlap P", "R", "F", "Boundary P", "R", "F", "found %")
+
+
+def report_text(scenes: Sequence[SceneResult], about: Mapping[str, object], last_step: int) -> str:
+    """The whole report.
+
+    Args:
+        scenes: all scenes of the evaluation, at least one.
+        about: its settings, by name.
+        last_step: the interactions that a scene may have.
+    """
+    sections = [
+        "# Evaluation\n",
+        "".join(f"- {name}: {value}\n" for name, value in about.items()),
+        _failures(scenes),
+        "## Scores after each interaction\n",
+        _score_section(scenes, last_step),
+        f"![share of objects found after each interaction]({FIGURE_FILE})\n",
+        "## What the interactions did to the scene\n",
+        _disturbance_section(scenes, last_step),
+        "## The scenes, worst first\n",
+        _scene_section(scenes, last_step),
+    ]
+    if scores_by_switch(scenes):
+        sections += ["## The literal paper against this version, one switch at a time\n"]
+        sections += [_ablation_section(scenes, last_step)]
+    return "\n".join(section for section in sections if section)
+
+
+def score_cells(scores: Scores) -> list[str]:
+    """The seven figures of the paper's table, in percent."""
+    return [_percent(share) for share in table_figures(scores)]
+
+
+def table_figures(scores: Scores) -> tuple[float, ...]:
+    """Overlap P, R, F, Boundary P, R, F and the share of objects found, in [0, 1]."""
+    return (
+        scores.overlap_precision,
+        scores.overlap_recall,
+        scores.overlap_f,
+        scores.boundary_precision,
+        scores.boundary_recall,
+        scores.boundary_f,
+        scores.found_share,
+    )
+
+
+def _score_section(scenes: Sequence[SceneResult], last_step: int) -> str:
+    rows = []
+    for method, scores in scores_by_method(scenes).items():
+        for i, mean in enumerate(step_means(scores, last_step)):
+            rows.append([_strong(method, method == OURS), str(i), *score_cells(mean)])
+    for method, published in PUBLISHED.items():
+        for i, row in enumerate(published):
+            rows.append([f"{method} (paper)", str(i), *(f"{figure:.1f}" for figure in row)])
+    reached = ", ".join(
+        f"{sum(scene.interactions >= i for scene in scenes)} reached {i}" for i in range(1, last_step + 1)
+    )
+    return (
+        _table(("method", "step i", *_HEAD), rows)
+        + f"""
+In percent. Step i is after i interactions; *found* is the share of objects with Overlap F above
+{FOUND_ABOVE_F:.0%}. Each figure is the unweighted mean over the {len(scenes)} scenes, so the mean F is not
+the F of the means. Every scene counts in every step: one that ended earlier, because nothing was left to
+push or because it failed, keeps its last state in the steps that follow; one that failed before its first
+image counts as an empty prediction. Of the {len(scenes)} scenes {reached}. The rows of the paper are its
+own, on its own 20 real scenes; the other rows are on the images of this evaluation.
+"""
+    )
+
+
+def _disturbance_section(scenes: Sequence[SceneResult], last_step: int) -> str:
+    disturbances = [scene.disturbances for scene in scenes]
+    rows = [
+        _disturbance_row(str(i), figures)
+        for i, figures in enumerate(disturbance_of_steps(disturbances, last_step), start=1)
+    ]
+    rows.append(_disturbance_row("**all**", disturbance_of_all(disturbances)))
+    head = (
+        "interaction",
+        "scenes",
+        "pushed object moved, mean cm",
+        "others moved, median mm",
+        "most tilt, degrees",
+        "toppled",
+        "left the table",
+    )
+    return (
+        _table(head, rows)
+        + f"""
+The pushed object is the one that the push was planned to meet. Tilt is against the start of the run; more
+than {TOPPLED_DEG:g} degrees count as toppled, also where a ball has merely rolled.
+"""
+    )
+
+
+def _disturbance_row(name: str, figures: DisturbanceFigures) -> list[str]:
+    return [
+        name,
+        str(figures.interactions),
+        _number(100 * figures.pushed_mean_m, 2),
+        _number(1000 * figures.others_median_m, 2),
+        _number(figures.tilt_max_deg, 1),
+        str(figures.toppled),
+        str(figures.left_table),
+    ]
+
+
+def _scene_section(scenes: Sequence[SceneResult], last_step: int) -> str:
+    rows = []
+    for scene in sorted(scenes, key=lambda scene: carried(scene.scores, last_step)[-1].overlap_f):
+        last = carried(scene.scores, last_step)[-1]
+        picture = f"[{scene.name}]({scene.name}/step_{scene.interactions}/overlay.png)"
+        found = "–" if isnan(last.objects_true) else f"{last.objects_found:g} of {last.objects_true:g}"
+        figures = [_percent(last.overlap_f), _percent(last.boundary_f), found]
+        rows.append(
+            [
+                picture if scene.scores else scene.name,
+                str(scene.seed),
+                str(scene.interactions),
+                *figures,
+                scene.failure or scene.end,
+            ]
+        )
+    return _table(("scene", "seed", "interactions", "Overlap F", "Boundary F", "found", "end"), rows)
+
+
+def _failures(scenes: Sequence[SceneResult]) -> str:
+    failed = [scene for scene in scenes if scene.failure]
+    if not failed:
+        return ""
+    lines = "".join(f"- {scene.name}, seed {scene.seed}: {scene.failure}\n" for scene in failed)
+    head = f"**{len(failed)} of {len(scenes)} scenes failed** and count with the last step that they reached:"
+    return f"{head}\n\n{lines}"
+
+
+def _ablation_section(scenes: Sequence[SceneResult], last_step: int) -> str:
+    ours = [scene.scores for scene in scenes]
+    rows = [[f"**{OURS}**", *score_cells(step_means(ours, last_step)[-1]), ""]]
+    for switch, scores in scores_by_switch(scenes).items():
+        mean = step_means(scores, last_step)[-1]
+        rows.append([switch, *score_cells(mean), _difference(scores, ours, last_step)])
+    return (
+        _table(("version", *_HEAD, "Overlap F against ours"), rows)
+        + """
+After the last interaction, in percent, means over the same scenes. The runs were made once, by this
+project's version, which chose the pushes; each row segments the recorded frames again with one switch as
+the paper has it (the last row with all of them). The difference in Overlap F is the mean over the scenes,
+± its standard error.
+"""
+        + "".join(
+            f"\nIn {scene.name} *{switch}* failed on the way and keeps what it had: {why}\n"
+            for scene in scenes
+            for switch, why in scene.ablation_failures.items()
+        )
+    )
+
+
+def _difference(scores: Sequence[Sequence[Scores]], ours: Sequence[Sequence[Scores]], last_step: int) -> str:
+    """The mean difference in Overlap F, scene by scene, with its standard error, in percent."""
+    difference = 100 * np.array(
+        [
+            carried(other, last_step)[-1].overlap_f - carried(own, last_step)[-1].overlap_f
+            for other, own in zip(scores, ours, strict=True)
+        ]
+    )
+    if len(difference) < 2:
+        return f"{difference.mean():+.1f}"
+    return f"{difference.mean():+.1f} ± {difference.std(ddof=1) / np.sqrt(len(difference)):.1f}"
+
+
+def _table(head: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
+    head = list(head)
+    lines = [
+        head,
+        ["---"] + ["---:"] * (len(head) - 1),
+        *([cell.replace("|", "/") for cell in row] for row in rows),
+    ]
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
+
+
+def _strong(text: str, strong: bool) -> str:
+    return f"**{text}**" if strong else text
+
+
+def _percent(share: float) -> str:
+    return _number(100 * share, 1)
+
+
+def _number(value: float, digits: int) -> str:
+    return "–" if isnan(value) else f"{value:.{digits}f}"
