@@ -63,9 +63,7 @@ class RenderedBodies:
     All have a texture but those whose index is in `blank`.
     """
 
-    def __init__(
-        self, shapes: list[str], folder: Path, seed: int = 0, blank: tuple[int, ...] = ()
-    ) -> None:
+    def __init__(self, shapes: list[str], folder: Path, seed: int = 0, blank: tuple[int, ...] = ()) -> None:
         rng = np.random.default_rng(seed)
         builder = DiagramBuilder()
         self.plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 1e-3)

@@ -38,7 +38,7 @@ class Algorithm:
         above_0, above_1 = (self.above[f.sequence] for f in (self.pair.reference, self.pair.current))
         e_t = expected_flow(self.pair.reference.depth, self.pair.X_C1C0, frame.intrinsics)
         o_t = self.flow(self.pair.reference.color, frame.color)
-        rng = np.random.default_rng(frame.sequence)
+        rng = np.random.default_rng([0, frame.sequence])
         self.groups = groups or group_body_frames(self.pair, e_t, o_t, above_0, self.bfif, rng)
         self.inputs = (self.pair, e_t, o_t, self.groups, above_0, above_1, self.segment)
         before = self.answer or nothing_segmented(frame.depth.shape)

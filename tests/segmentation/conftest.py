@@ -27,7 +27,11 @@ class ThreeBodies:
     def __init__(self, folder: Path, blank: tuple[int, ...] = ()) -> None:
         shapes = [box(0.07, 0.05, 0.04), box(0.055, 0.06, 0.05), box(0.04, 0.10, 0.02)]
         self.world = RenderedBodies(shapes, folder, blank=blank)
-        self.rest = [planar_pose(-0.065, 0, 0.02, 0.3), planar_pose(0.008, 0.01, 0.025), planar_pose(0.07, 0, 0.01)]
+        self.rest = [
+            planar_pose(-0.065, 0, 0.02, 0.3),
+            planar_pose(0.008, 0.01, 0.025),
+            planar_pose(0.07, 0, 0.01),
+        ]
 
     def pair(
         self, moved: dict[int, RigidTransform], camera_0: RigidTransform, camera_1: RigidTransform, seed: int

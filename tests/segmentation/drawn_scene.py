@@ -66,15 +66,16 @@ class DrawnScene:
     """Boxes of sizes (length x, length y, height), at any poses, seen from any pose."""
 
     sizes: list[tuple[float, float, float]]
-    textures: list = None
-    table: object = field(default_factory=Blank)
+    textures: list["Texture | Blank"] = field(default_factory=list)
+    """One for each box; waves of its own if none is given."""
+    table: "Texture | Blank" = field(default_factory=Blank)
     intrinsics: Intrinsics = CAMERA
     depth_noise: float = 0.0023
     """Standard deviation of depth at 1 m, m, where a scene is drawn with noise."""
     color_noise: float = 2.0
 
     def __post_init__(self) -> None:
-        if self.textures is None:
+        if not self.textures:
             self.textures = [Texture(seed) for seed in range(len(self.sizes))]
 
     def frame(

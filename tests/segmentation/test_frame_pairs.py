@@ -83,5 +83,5 @@ def test_the_cameras_span_is_that_of_its_shift_or_of_its_turn(shift: float) -> N
 
 
 def test_another_kind_of_pair_is_refused_with_the_choices() -> None:
-    with pytest.raises(ValueError, match="'keyframe'.*motion or consecutive"):
+    with pytest.raises(ValueError, match=r"'keyframe'.*motion or consecutive"):
         next_pair(None, frame(0), 0.0, FramePairParameters(kind="keyframe"))

@@ -33,7 +33,8 @@ def moved_frames(
     """`count` frames for each motion, within 5 cm of CENTRE, with flow and depth noise; and their groups."""
     group = np.repeat(np.arange(len(motions)), count)
     seed = CENTRE + rng.uniform(-0.05, 0.05, (len(group), 1, 3)) * [1, 1, 0.4]
-    p_0 = seed + np.concatenate([np.zeros((len(group), 1, 3)), rng.uniform(-0.01, 0.01, (len(group), 20, 3))], 1)
+    p_0 = seed + rng.uniform(-0.01, 0.01, (len(group), 21, 3))
+    p_0[:, 0] = seed[:, 0]
     p_1 = np.stack([move_points(motions[g], p) for g, p in zip(group, p_0, strict=True)])
     z = p_1[..., 2:]
     if noisy:
@@ -59,9 +60,7 @@ def test_each_group_gets_its_own_motion_and_frames_of_none_count_for_none() -> N
     truth = [about_centre(0.1, 0.0, 0.0), about_centre(0.0, 0.005, 0.0), about_centre(0.0, -0.05, 0.05)]
     frames, group = moved_frames(truth, np.random.default_rng(1), noisy=False)
     group[group == 2] = -1
-    np.testing.assert_allclose(
-        group_motions(frames, group, DEPTH_NOISE, FOCAL_LENGTH), truth[:2], atol=1e-7
-    )
+    np.testing.assert_allclose(group_motions(frames, group, DEPTH_NOISE, FOCAL_LENGTH), truth[:2], atol=1e-7)
 
 
 def test_no_groups_have_no_motions() -> None:

@@ -103,5 +103,4 @@ def test_pushing_by_flow_moves_labels_by_whole_pixels_and_off_the_image() -> Non
 def test_an_unknown_choice_is_refused_with_the_choices(pushed, wrong, choices) -> None:
     algorithm = Algorithm(segment=SegmentParameters(**wrong))
     with pytest.raises(ValueError, match=choices):
-        for frame, _ in pushed[:8]:
-            algorithm.take(frame)
+        list(map(algorithm.take, [frame for frame, _ in pushed[:8]]))
