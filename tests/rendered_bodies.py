@@ -58,9 +58,12 @@ def cylinder(radius: float, length: float) -> str:
 
 
 class RenderedBodies:
-    """Bodies given as SDF geometries, drawn at any poses from any camera pose."""
+    """Bodies given as SDF geometries, drawn at any poses from any camera pose.
 
-    def __init__(self, shapes: list[str], folder: Path, seed: int = 0) -> None:
+    All have a texture but those whose index is in `blank`.
+    """
+
+    def __init__(self, shapes: list[str], folder: Path, seed: int = 0, blank: tuple[int, ...] = ()) -> None:
         rng = np.random.default_rng(seed)
         builder = DiagramBuilder()
         self.plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 1e-3)
@@ -74,8 +77,9 @@ class RenderedBodies:
         Parser(self.plant).AddModelsFromString(sdf, "sdf")
         self.bodies = []
         for i, shape in enumerate(shapes):
-            texture = folder / f"texture_{seed}_{i}.png"
-            write_texture(texture, rng)
+            texture = None if i in blank else folder / f"texture_{seed}_{i}.png"
+            if texture:
+                write_texture(texture, rng)
             model = folder / f"body_{seed}_{i}.sdf"
             model.write_text(_body_sdf(f"body_{i}", shape, texture, "0 0 0 0 0 0"))
             (instance,) = Parser(self.plant).AddModels(str(model))
@@ -133,7 +137,7 @@ class RenderedBodies:
 
 def _body_sdf(name: str, geometry: str, texture: Path | None, pose: str, static: bool = False) -> str:
     texture_tag = f"<drake:diffuse_map>{texture.name}</drake:diffuse_map>" if texture else ""
-    color = "1 1 1 1" if texture else "0.9 0.9 0.9 1"
+    color = "1 1 1 1" if texture else "0.9 0.9 0.9 1" if static else "0.5 0.4 0.3 1"
     return f"""<sdf version="1.7"><model name="{name}"><static>{str(static).lower()}</static>
     <link name="{name}"><inertial><mass>0.1</mass></inertial>
     <visual name="v"><pose>{pose}</pose><geometry>{geometry}</geometry>

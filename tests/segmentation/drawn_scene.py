@@ -1,12 +1,13 @@
 """Boxes on a table, drawn by intersecting rays: depth, labels and texture are exact, and it is quick."""
 
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from riseg_drake.geometry.camera import Intrinsics, rays
+from riseg_drake.geometry.camera import WHOLE, Intrinsics, Region, project, rays
 from riseg_drake.geometry.rgbd import Frame, FramePair
 
 CAMERA = Intrinsics(320, 240, 308.1, 307.9, 158.2, 119.4)
@@ -66,15 +67,16 @@ class DrawnScene:
     """Boxes of sizes (length x, length y, height), at any poses, seen from any pose."""
 
     sizes: list[tuple[float, float, float]]
-    textures: list = None
-    table: object = field(default_factory=Blank)
+    textures: list["Texture | Blank"] = field(default_factory=list)
+    """One for each box; waves of its own if none is given."""
+    table: "Texture | Blank" = field(default_factory=Blank)
     intrinsics: Intrinsics = CAMERA
     depth_noise: float = 0.0023
     """Standard deviation of depth at 1 m, m, where a scene is drawn with noise."""
     color_noise: float = 2.0
 
     def __post_init__(self) -> None:
-        if self.textures is None:
+        if not self.textures:
             self.textures = [Texture(seed) for seed in range(len(self.sizes))]
 
     def frame(
@@ -95,9 +97,10 @@ class DrawnScene:
         depth[~(depth > 0)] = 0
         label = np.zeros(depth.shape, np.uint16)
         for number, (size, X_WB) in enumerate(zip(self.sizes, X_WBs, strict=True), 1):
-            enter = _enter_box(np.array(size), X_WB, eye_W, ray_W)
-            hit = enter < np.where(depth > 0, depth, np.inf)
-            depth[hit], label[hit] = enter[hit], number
+            region = self._where(np.array(size), X_WB, X_WC)
+            enter = _enter_box(np.array(size), X_WB, eye_W, ray_W[region])
+            hit = enter < np.where(depth[region] > 0, depth[region], np.inf)
+            depth[region][hit], label[region][hit] = enter[hit], number
         color = np.full((*depth.shape, 3), 255.0)
         p_WQ = eye_W + depth[..., None] * ray_W
         for number, texture in enumerate([self.table, *self.textures]):
@@ -120,6 +123,17 @@ class DrawnScene:
             robot=robot,
         )
         return frame, label
+
+    def _where(self, size: NDArray, X_WB: NDArray, X_WC: NDArray) -> Region:
+        """The rectangle of the image in which a box is seen."""
+        corners = np.array(list(product((-0.5, 0.5), (-0.5, 0.5), (0.0, 1.0)))) * size
+        X_CB = np.linalg.inv(X_WC) @ X_WB
+        uv = project(corners @ X_CB[:3, :3].T + X_CB[:3, 3], self.intrinsics)
+        if np.isnan(uv).any():
+            return WHOLE
+        shape = self.intrinsics.shape[::-1]
+        first, last = (np.clip(k, 0, shape).astype(int) for k in (uv.min(0) - 1, uv.max(0) + 2))
+        return slice(first[1], last[1]), slice(first[0], last[0])
 
     def pair(
         self,

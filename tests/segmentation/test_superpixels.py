@@ -1,0 +1,120 @@
+"""Pieces of a masked image, on images drawn by hand."""
+
+import numpy as np
+import pytest
+
+from riseg_drake.segmentation.superpixels import Superpixels, superpixels
+from tests.segmentation.drawn_scene import Texture
+
+HEIGHT, WIDTH = 60, 80
+
+
+def flat(shape: tuple[int, int] = (HEIGHT, WIDTH), gray: int = 120) -> np.ndarray:
+    return np.full((*shape, 3), gray, np.uint8)
+
+
+def cut(color: np.ndarray, mask: np.ndarray, size: int = 10, height: np.ndarray | None = None) -> Superpixels:
+    height = np.zeros(mask.shape, np.float32) if height is None else height
+    return superpixels(color, height, mask, size)
+
+
+def blob() -> np.ndarray:
+    """A mask with a hole, a part at the image's border, and a few lone pixels."""
+    v, u = np.mgrid[:HEIGHT, :WIDTH]
+    mask = np.hypot(v - 28, u - 40) < 25
+    mask &= np.hypot(v - 28, u - 36) > 6
+    mask[40:, :12] = True
+    mask[3, 3] = mask[10, 70] = mask[50:52, 75] = True
+    return mask
+
+
+def textured() -> np.ndarray:
+    v, u = np.mgrid[:HEIGHT, :WIDTH]
+    points = np.stack([u, v, 0 * u], axis=-1).reshape(-1, 3) * 0.001
+    return np.clip(Texture(0).color(points), 0, 255).reshape(HEIGHT, WIDTH, 3).astype(np.uint8)
+
+
+@pytest.mark.parametrize("size", [3, 6, 15])
+@pytest.mark.parametrize("color", [flat(), textured()], ids=["blank", "textured"])
+def test_no_piece_lies_outside_the_mask_and_none_is_empty(color: np.ndarray, size: int) -> None:
+    pieces = cut(color, blob(), size)
+    assert (pieces.label[~blob()] == -1).all()
+    np.testing.assert_array_equal(np.unique(pieces.label[pieces.label >= 0]), np.arange(pieces.count))
+
+
+def test_a_mask_that_fills_the_image_is_covered_to_its_last_pixel() -> None:
+    assert (cut(textured(), np.ones((HEIGHT, WIDTH), bool)).label >= 0).all()
+
+
+def test_pieces_have_about_the_size_asked() -> None:
+    pieces = cut(flat(), np.ones((HEIGHT, WIDTH), bool), 10)
+    area = np.bincount(pieces.label.ravel())
+    assert pieces.count == HEIGHT * WIDTH // 100
+    assert np.median(area) == pytest.approx(100, rel=0.3)
+
+
+@pytest.mark.parametrize("which", ["colour", "height"])
+def test_no_piece_crosses_a_strong_edge(which: str) -> None:
+    v, u = np.mgrid[:HEIGHT, :WIDTH]
+    beyond = u - 40 > 4 * np.sin(v / 6)
+    color, height = flat(), np.zeros((HEIGHT, WIDTH), np.float32)
+    if which == "colour":
+        color[beyond] = [160, 60, 60]
+    else:
+        height[beyond] = 0.03
+    pieces = cut(color, np.ones((HEIGHT, WIDTH), bool), 10, height)
+    across = np.minimum(
+        np.bincount(pieces.label.ravel(), beyond.ravel()), np.bincount(pieces.label.ravel(), ~beyond.ravel())
+    )
+    # An edge is found to within a pixel, along a piece's length.
+    assert across.max() <= 15
+    assert across.sum() < 0.02 * beyond.size
+
+
+def counted_borders(label: np.ndarray) -> dict[tuple[int, int], int]:
+    """Pairs of neighbouring pixels with different labels, one by one."""
+    borders: dict[tuple[int, int], int] = {}
+    for v in range(label.shape[0]):
+        for u in range(label.shape[1]):
+            for a, b in ((v + 1, u), (v, u + 1)):
+                if a < label.shape[0] and b < label.shape[1] and label[v, u] != label[a, b]:
+                    pair = tuple(sorted((int(label[v, u]), int(label[a, b]))))
+                    if pair[0] >= 0:
+                        borders[pair] = borders.get(pair, 0) + 1
+    return borders
+
+
+def test_borders_are_as_long_as_counted_pixel_by_pixel() -> None:
+    pieces = cut(textured(), blob(), 8)
+    found = {(int(a), int(b)): int(n) for (a, b), n in zip(pieces.borders, pieces.length, strict=True)}
+    assert len(found) == len(pieces.borders)
+    assert found == counted_borders(pieces.label)
+
+
+def test_two_halves_share_one_border_of_the_images_height() -> None:
+    color = flat((20, 40))
+    color[:, 20:] = 200
+    pieces = cut(color, np.ones((20, 40), bool), 20)
+    np.testing.assert_array_equal(pieces.borders, [[0, 1]])
+    assert pieces.length[0] == pytest.approx(20, abs=2)
+    assert pieces.contrast[0] > 50
+
+
+def test_a_border_on_a_blank_surface_has_no_contrast_and_one_on_an_edge_has() -> None:
+    color = flat()
+    color[:, 40:] = 190
+    pieces = cut(color, np.ones((HEIGHT, WIDTH), bool), 10)
+    side = np.array([np.mean(np.nonzero(pieces.label == k)[1]) > 40 for k in range(pieces.count)])
+    over_edge = side[pieces.borders[:, 0]] != side[pieces.borders[:, 1]]
+    # Not at the image's own rim, where there is nothing beyond to compare with.
+    u = np.array([np.mean(np.nonzero(pieces.label == k)[1]) for k in range(pieces.count)])
+    v = np.array([np.mean(np.nonzero(pieces.label == k)[0]) for k in range(pieces.count)])
+    inner = (v[pieces.borders] > 10).all(1) & (v[pieces.borders] < 50).all(1)
+    far = (np.abs(u[pieces.borders] - 40) > 12).all(1)
+    assert np.median(pieces.contrast[over_edge & inner]) > 40
+    assert pieces.contrast[~over_edge & inner & far].max() < 2
+
+
+def test_unknown_height_is_no_obstacle() -> None:
+    height = np.full((HEIGHT, WIDTH), np.nan, np.float32)
+    assert (cut(flat(), np.ones((HEIGHT, WIDTH), bool), 8, height).label >= 0).all()

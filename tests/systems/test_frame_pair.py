@@ -1,0 +1,197 @@
+"""FramePairMemory: which image goes with which theta, and with which reference."""
+
+import numpy as np
+import pytest
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder, LeafSystem
+from pydrake.systems.primitives import ConstantVectorSource
+from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
+
+from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.segmentation.frame_pairs import FramePairParameters
+from riseg_drake.systems.frame_pair import FramePairMemory
+from riseg_drake.systems.frame_view import FrameView
+from tests.systems.ports import port_names
+
+CAMERA = Intrinsics(6, 4, 5.0, 5.0, 2.5, 1.5)
+PERIOD, OFFSET = 0.1, 0.001
+
+
+class Station(LeafSystem):
+    """At each tick a new image and a new theta, both with the frame's number written into them."""
+
+    def __init__(self, repeat: int = 1) -> None:
+        """`repeat` ticks in a row show the same image, with the same time."""
+        super().__init__()
+        self._repeat = repeat
+        self._ticks = self.DeclareDiscreteState([-1.0])
+        self.DeclarePeriodicDiscreteUpdateEvent(PERIOD, 0.0, self._tick)
+        for name, image, calc in (
+            ("color_image", ImageRgba8U(), self._calc_color),
+            ("depth_image", ImageDepth32F(), self._calc_depth),
+        ):
+            model = Value(image)
+            self.DeclareAbstractOutputPort(name, model.Clone, calc, {self.all_state_ticket()})
+        self.DeclareVectorOutputPort("image_time", 1, self._calc_time, {self.all_state_ticket()})
+        self.DeclareVectorOutputPort("position", 7, self._calc_position, {self.all_state_ticket()})
+
+    def number(self, context) -> int:
+        """Of the newest frame; -1 before the first tick."""
+        ticks = int(context.get_discrete_state(self._ticks)[0])
+        return ticks // self._repeat if ticks >= 0 else -1
+
+    def _tick(self, context, state) -> None:
+        state.get_mutable_vector(self._ticks)[0] = context.get_discrete_state(self._ticks)[0] + 1
+
+    def _calc_color(self, context, output) -> None:
+        number = self.number(context)
+        image = ImageRgba8U(6, 4) if number >= 0 else ImageRgba8U()
+        image.mutable_data[...] = max(0, number)
+        output.set_value(image)
+
+    def _calc_depth(self, context, output) -> None:
+        number = self.number(context)
+        image = ImageDepth32F(6, 4) if number >= 0 else ImageDepth32F()
+        image.mutable_data[...] = 1 + number
+        output.set_value(image)
+
+    def _calc_time(self, context, output) -> None:
+        output[0] = max(0, self.number(context)) * self._repeat * PERIOD
+
+    def _calc_position(self, context, output) -> None:
+        output.SetFromVector(np.full(7, float(self.number(context))))
+
+
+class AboveOfFrame(LeafSystem):
+    """In place of ObjectsAboveTable: says of which frame it would have been, by the image's number."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        frame = self.DeclareAbstractInputPort("frame", AbstractValue.Make(object()))
+        self.DeclareAbstractOutputPort(
+            "above_table",
+            lambda: AbstractValue.Make(object()),
+            lambda context, output: output.set_value(("above", number_in(frame.Eval(context)))),
+            {self.all_input_ports_ticket()},
+        )
+
+
+def forward(q: np.ndarray) -> np.ndarray:
+    X_WC = np.eye(4)
+    X_WC[0, 3] = q[0] / 100
+    return X_WC
+
+
+def silhouette(q: np.ndarray) -> np.ndarray:
+    mask = np.zeros(CAMERA.shape, bool)
+    mask.flat[: int(q[0])] = True
+    return mask
+
+
+def number_in(frame) -> int | None:
+    """The number written into the image."""
+    return None if frame is None else int(frame.color[0, 0, 0])
+
+
+class Loop:
+    """Station, FrameView and FramePairMemory, simulated."""
+
+    def __init__(self, found: float = 0.0, repeat: int = 1, **parameters) -> None:
+        builder = DiagramBuilder()
+        self.station = builder.AddSystem(Station(repeat))
+        view = builder.AddSystem(FrameView(CAMERA, forward, silhouette))
+        above = builder.AddSystem(AboveOfFrame())
+        self.memory = builder.AddSystem(FramePairMemory(PERIOD, OFFSET, FramePairParameters(**parameters)))
+        span = builder.AddSystem(ConstantVectorSource([found]))
+        for name in ("color_image", "depth_image", "image_time", "position"):
+            builder.Connect(self.station.GetOutputPort(name), view.GetInputPort(name))
+        for target in (above, self.memory):
+            builder.Connect(view.GetOutputPort("frame"), target.GetInputPort("frame"))
+        builder.Connect(above.GetOutputPort("above_table"), self.memory.GetInputPort("above_table"))
+        builder.Connect(span.get_output_port(), self.memory.GetInputPort("flow_span"))
+        self.simulator = Simulator(builder.Build())
+        self.context = self.memory.GetMyContextFromRoot(self.simulator.get_context())
+
+    def at(self, time: float) -> FramePair | None:
+        self.simulator.AdvanceTo(time)
+        return self.read("pair")
+
+    def read(self, port: str):
+        return self.memory.GetOutputPort(port).Eval(self.context)
+
+
+JUST_AFTER = OFFSET + 1e-4
+"""After a tick, s: the memory has had its turn."""
+
+
+def test_ports_have_the_names_of_the_contract() -> None:
+    inputs, outputs = port_names(FramePairMemory(PERIOD, OFFSET))
+    assert inputs == ["frame", "above_table", "flow_span"]
+    assert outputs == ["pair", "above_table_reference", "above_table", "pair_time"]
+
+
+def test_before_the_first_frame_there_is_nothing() -> None:
+    loop = Loop()
+    assert loop.at(OFFSET / 2) is None
+    assert loop.read("above_table") is None
+    assert loop.read("above_table_reference") is None
+    assert loop.read("pair_time") == pytest.approx([0.0])
+
+
+@pytest.mark.parametrize("kind", ["motion", "consecutive"])
+@pytest.mark.parametrize("found", [0.0, 5.0, 50.0])
+def test_image_theta_and_objmask_of_a_frame_belong_to_the_same_tick(kind: str, found: float) -> None:
+    loop = Loop(found, kind=kind)
+    for tick in range(8):
+        pair = loop.at(tick * PERIOD + JUST_AFTER)
+        for frame in (pair.reference, pair.current):
+            number = number_in(frame)
+            assert frame.X_WC[0, 3] == number / 100
+            assert np.count_nonzero(frame.robot) == number
+            assert frame.depth[0, 0] == 1 + number
+            assert frame.time == pytest.approx(number * PERIOD)
+            assert frame.sequence == number
+        assert loop.read("above_table") == ("above", number_in(pair.current))
+        assert loop.read("above_table_reference") == ("above", number_in(pair.reference))
+        assert loop.read("pair_time") == pytest.approx([pair.current.time])
+
+
+def test_the_frame_of_a_tick_is_there_right_after_that_tick() -> None:
+    loop = Loop()
+    for tick in range(5):
+        assert number_in(loop.at(tick * PERIOD + JUST_AFTER).current) == tick
+        assert number_in(loop.at((tick + 0.99) * PERIOD).current) == tick
+
+
+def test_the_first_frame_is_paired_with_itself() -> None:
+    pair = Loop().at(JUST_AFTER)
+    assert pair.reference is pair.current
+
+
+def test_consecutive_pairs_follow_each_other() -> None:
+    loop = Loop(kind="consecutive")
+    pairs = [loop.at(tick * PERIOD + JUST_AFTER) for tick in range(4)]
+    assert [number_in(pair.reference) for pair in pairs] == [0, 0, 1, 2]
+
+
+@pytest.mark.parametrize(("found", "references"), [(5.0, [0, 0, 0, 0]), (50.0, [0, 0, 1, 2])])
+def test_the_flow_span_decides_whether_the_reference_stays(found: float, references: list[int]) -> None:
+    far = {"camera_span_moving": 1e3, "camera_span_still": 1e3}
+    loop = Loop(found, flow_span=20.0, **far)
+    pairs = [loop.at(tick * PERIOD + JUST_AFTER) for tick in range(4)]
+    assert [number_in(pair.reference) for pair in pairs] == references
+
+
+def test_an_image_that_repeats_is_no_new_frame() -> None:
+    loop = Loop(repeat=3, kind="consecutive")
+    pairs = [loop.at(tick * PERIOD + JUST_AFTER) for tick in range(9)]
+    assert [pair.current.sequence for pair in pairs] == [0, 0, 0, 1, 1, 1, 2, 2, 2]
+    assert pairs[3] is pairs[5]
+    assert [number_in(pair.reference) for pair in pairs] == [0, 0, 0, 0, 0, 0, 1, 1, 1]
+
+
+def test_an_unknown_kind_of_pairs_is_refused_with_the_choices() -> None:
+    with pytest.raises(ValueError, match="motion or consecutive"):
+        Loop(kind="keyframe").at(2 * PERIOD)

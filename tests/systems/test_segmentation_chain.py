@@ -1,0 +1,203 @@
+"""All systems of Alg. 2 wired: every stage works once a frame, whoever reads and however often."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from pydrake.common.value import Value
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder, EventStatus, LeafSystem
+from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
+
+from riseg_drake.segmentation.optical_flow import DisFlow
+from riseg_drake.systems import bfif_grouper, expected_flow, mask_propagator, objects_above_table
+from riseg_drake.systems.bfif_grouper import BFIFGrouper
+from riseg_drake.systems.expected_flow import ExpectedFlow
+from riseg_drake.systems.frame_pair import FramePairMemory
+from riseg_drake.systems.frame_view import FrameView
+from riseg_drake.systems.mask_propagator import MaskPropagator
+from riseg_drake.systems.objects_above_table import ObjectsAboveTable
+from riseg_drake.systems.optical_flow import OpticalFlow
+from tests.segmentation.algorithm import Algorithm
+from tests.segmentation.drawn_scene import CAMERA, looking_down
+
+PERIOD = 1 / 15
+JUST_BEFORE = 0.01
+"""Of the next tick, s."""
+
+
+class Film(LeafSystem):
+    """A station that shows drawn frames, one a period; its arm trembles all the time.
+
+    The camera's place along x is joint 1, the number of the frame joint 2; the tremble is joint 7's.
+    """
+
+    def __init__(self, frames) -> None:
+        super().__init__()
+        self._frames = frames
+        self._shown = self.DeclareDiscreteState([0.0])
+        self.DeclarePeriodicDiscreteUpdateEvent(PERIOD, PERIOD, self._tick)
+        for name, model, calc in (
+            ("color_image", Value(ImageRgba8U()), self._calc_color),
+            ("depth_image", Value(ImageDepth32F()), self._calc_depth),
+        ):
+            self.DeclareAbstractOutputPort(name, model.Clone, calc, {self.all_state_ticket()})
+        self.DeclareVectorOutputPort("image_time", 1, self._calc_time, {self.all_state_ticket()})
+        self.DeclareVectorOutputPort("position", 7, self._calc_position)
+
+    def _number(self, context) -> int:
+        return int(context.get_discrete_state(self._shown)[0])
+
+    def _tick(self, context, state) -> None:
+        state.get_mutable_vector(self._shown)[0] = self._number(context) + 1
+
+    def _calc_color(self, context, output) -> None:
+        image = ImageRgba8U(CAMERA.width, CAMERA.height)
+        image.mutable_data[..., :3] = self._frames[self._number(context)].color
+        output.set_value(image)
+
+    def _calc_depth(self, context, output) -> None:
+        image = ImageDepth32F(CAMERA.width, CAMERA.height)
+        image.mutable_data[..., 0] = self._frames[self._number(context)].depth
+        output.set_value(image)
+
+    def _calc_time(self, context, output) -> None:
+        output[0] = self._number(context) * PERIOD
+
+    def _calc_position(self, context, output) -> None:
+        number = self._number(context)
+        output.SetFromVector([0.001 * number, number, 0, 0, 0, 0, np.sin(100 * context.get_time())])
+
+
+class Reader(LeafSystem):
+    """Reads every output of every stage, 500 times a second."""
+
+    def __init__(self, ports) -> None:
+        super().__init__()
+        self.reads = 0
+        self._inputs = []
+        for k, port in enumerate(ports):
+            self._inputs.append(self._declare(f"u{k}", port))
+        self.DeclarePeriodicPublishEvent(0.002, 0.0005, self._read)
+
+    def _declare(self, name, port):
+        if port.get_data_type().name == "kVectorValued":
+            return self.DeclareVectorInputPort(name, port.size())
+        return self.DeclareAbstractInputPort(name, port.Allocate())
+
+    def _read(self, context) -> EventStatus:
+        pair = self._inputs[0].Eval(context)
+        if pair is not None:
+            self.reads += 1
+            for read in self._inputs:
+                read.Eval(context)
+        return EventStatus.Succeeded()
+
+
+@pytest.fixture
+def counts(monkeypatch) -> Counter:
+    """How often the work of each stage was done."""
+    made: Counter = Counter()
+
+    def count(module, name) -> None:
+        work = getattr(module, name)
+
+        def counted(*arguments):
+            made[name] += 1
+            return work(*arguments)
+
+        monkeypatch.setattr(module, name, counted)
+
+    count(objects_above_table, "objects_above_table")
+    count(expected_flow, "expected_flow")
+    count(bfif_grouper, "group_body_frames")
+    count(mask_propagator, "segment")
+    return made
+
+
+class Chain:
+    """The film, the wired stages and the reader."""
+
+    def __init__(self, frames, counts: Counter) -> None:
+        builder = DiagramBuilder()
+        film = builder.AddSystem(Film(frames))
+        method = DisFlow()
+
+        def flow(color_0: np.ndarray, color_1: np.ndarray) -> np.ndarray:
+            counts["optical_flow"] += 1
+            return method(color_0, color_1)
+
+        def forward(q: np.ndarray) -> np.ndarray:
+            counts["forward_kinematics"] += 1
+            return looking_down(q[0])
+
+        nobody = np.zeros(CAMERA.shape, bool)
+        view = builder.AddSystem(FrameView(CAMERA, forward, lambda q: nobody))
+        above = builder.AddSystem(ObjectsAboveTable())
+        memory = builder.AddSystem(FramePairMemory(PERIOD, 0.001))
+        expected = builder.AddSystem(ExpectedFlow())
+        optical = builder.AddSystem(OpticalFlow(flow))
+        grouper = builder.AddSystem(BFIFGrouper(seed=0))
+        self.propagator = builder.AddSystem(MaskPropagator(CAMERA, PERIOD, 0.0015))
+        for source, output, target, port in (
+            (film, "color_image", view, "color_image"),
+            (film, "depth_image", view, "depth_image"),
+            (film, "image_time", view, "image_time"),
+            (film, "position", view, "position"),
+            (view, "frame", above, "frame"),
+            (view, "frame", memory, "frame"),
+            (above, "above_table", memory, "above_table"),
+            (grouper, "flow_span", memory, "flow_span"),
+            (memory, "pair", expected, "pair"),
+            (memory, "pair", optical, "pair"),
+            (memory, "pair", grouper, "pair"),
+            (memory, "pair", self.propagator, "pair"),
+            (memory, "above_table_reference", grouper, "above_table"),
+            (memory, "above_table_reference", self.propagator, "above_table_reference"),
+            (memory, "above_table", self.propagator, "above_table"),
+            (expected, "expected_flow", grouper, "expected_flow"),
+            (expected, "expected_flow", self.propagator, "expected_flow"),
+            (optical, "optical_flow", grouper, "optical_flow"),
+            (optical, "optical_flow", self.propagator, "optical_flow"),
+            (grouper, "groups", self.propagator, "groups"),
+        ):
+            builder.Connect(source.GetOutputPort(output), target.GetInputPort(port))
+        ports = [
+            system.get_output_port(k)
+            for system in (memory, expected, optical, grouper, self.propagator)
+            for k in range(system.num_output_ports())
+        ]
+        self.reader = builder.AddSystem(Reader(ports))
+        for k, port in enumerate(ports):
+            builder.Connect(port, self.reader.get_input_port(k))
+        self.simulator = Simulator(builder.Build())
+
+    def mask(self) -> np.ndarray:
+        context = self.propagator.GetMyContextFromRoot(self.simulator.get_context())
+        return self.propagator.GetOutputPort("mask").Eval(context)
+
+
+STAGES = {
+    "forward_kinematics",
+    "objects_above_table",
+    "expected_flow",
+    "optical_flow",
+    "group_body_frames",
+    "segment",
+}
+
+
+def test_every_stage_works_once_a_frame_though_someone_reads_at_500_hz(drawn_frames, counts) -> None:
+    chain = Chain(drawn_frames, counts)
+    for number in range(1, len(drawn_frames) + 1):
+        chain.simulator.AdvanceTo(number * PERIOD - JUST_BEFORE)
+        assert dict(counts) == dict.fromkeys(STAGES, number)
+    assert chain.reader.reads > 200
+
+
+def test_the_wired_systems_give_the_masks_that_the_functions_give(drawn_frames, counts) -> None:
+    chain, algorithm = Chain(drawn_frames, counts), Algorithm()
+    for number, frame in enumerate(drawn_frames):
+        chain.simulator.AdvanceTo((number + 1) * PERIOD - JUST_BEFORE)
+        np.testing.assert_array_equal(chain.mask(), algorithm.take(frame).mask)
+    assert chain.mask().any()
