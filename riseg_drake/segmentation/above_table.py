@@ -17,6 +17,11 @@ from riseg_drake.geometry.plane import (
 )
 from riseg_drake.geometry.rgbd import Frame, Immutable
 
+_COLOR_SPREAD_MIN = 4.0
+"""Gray levels; a table's colour is not known better than that."""
+_TABLE_SIGMAS = 4.0
+"""A colour further than that many standard deviations from the table's, in any channel, is not the table's."""
+
 
 @dataclass
 class AboveTableParameters:
@@ -58,35 +63,59 @@ def objects_above_table(frame: Frame, parameters: AboveTableParameters) -> Above
     seen = ~frame.robot
     plane_C = fit_plane(frame.depth, frame.intrinsics, rng, parameters.plane, valid=seen)
     height = heights_above_plane(frame.depth, frame.intrinsics, plane_C)
-    depth_noise = _depth_noise(height, frame.depth, seen, parameters)
+    on_table = _on_table(height, frame, parameters)
+    depth_noise = _depth_noise(height, frame.depth, on_table, parameters)
     low = np.maximum(
         np.float32(parameters.height_min),
         np.float32(parameters.noise_multiple * depth_noise) * frame.depth**2,
     )
     with np.errstate(invalid="ignore"):
         mask = (height > low) & seen
-    mask = _without_specks(mask, frame, parameters.area_min)
+    mask = _without_specks(mask, frame, on_table, parameters.area_min)
     return AboveTable(mask, height, transform_plane(frame.X_WC, plane_C), depth_noise)
 
 
-def _depth_noise(
-    height: NDArray, depth: NDArray, seen: NDArray[np.bool_], parameters: AboveTableParameters
-) -> float:
-    """Noise of depth at 1 m (m), from the scatter of the table's own pixels about the plane."""
-    coarse = (slice(None, None, 5), slice(None, None, 5))
-    h, z = height[coarse][seen[coarse]], depth[coarse][seen[coarse]]
+def _every(n: int) -> tuple[slice, slice]:
+    """Every n-th pixel in both directions."""
+    return slice(None, None, n), slice(None, None, n)
+
+
+def _on_table(height: NDArray, frame: Frame, parameters: AboveTableParameters) -> NDArray[np.bool_]:
+    """Which of every fifth pixel in both directions lie on the plane, as far as noise may be assumed."""
+    h, z, robot = height[_every(5)], frame.depth[_every(5)], frame.robot[_every(5)]
     assumed = np.hypot(parameters.plane.tolerance / 3, parameters.plane.depth_noise * z**2)
     with np.errstate(invalid="ignore"):
-        on_table = np.abs(h) < 3 * assumed
+        return (np.abs(h) < 3 * assumed) & ~robot
+
+
+def _depth_noise(
+    height: NDArray, depth: NDArray, on_table: NDArray[np.bool_], parameters: AboveTableParameters
+) -> float:
+    """Noise of depth at 1 m (m), from the scatter of the table's own pixels about the plane."""
     if np.count_nonzero(on_table) < 100:
         return parameters.plane.depth_noise
+    h, z = height[_every(5)][on_table], depth[_every(5)][on_table]
     # Not by a median: depth in whole millimetres makes it 0 on a table that faces the camera.
-    return float(np.sqrt(np.mean((h[on_table] / z[on_table] ** 2) ** 2)))
+    return float(np.sqrt(np.mean((h / z**2) ** 2)))
 
 
-def _without_specks(mask: NDArray[np.bool_], frame: Frame, area_min: float) -> NDArray[np.bool_]:
-    """Drop the connected pieces that are smaller than `area_min` (m^2), and close pinholes."""
+def _looks_like_table(color: NDArray[np.uint8], table_color: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Which colours [N, 3] may be the table's, given M of it [M, 3]."""
+    if len(table_color) < 100:
+        return np.ones(len(color), bool)
+    spread = np.maximum(table_color.std(axis=0), _COLOR_SPREAD_MIN)
+    return (np.abs(color - table_color.mean(axis=0)) < _TABLE_SIGMAS * spread).all(axis=1)
+
+
+def _without_specks(
+    mask: NDArray[np.bool_], frame: Frame, on_table: NDArray[np.bool_], area_min: float
+) -> NDArray[np.bool_]:
+    """Close pinholes, add the rim without depth, drop connected pieces smaller than `area_min` (m^2)."""
     closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    # Stereo has no depth on the last pixels before an edge, nor on the first behind it. Colour tells which
+    # are the object's, where the table has a colour of its own.
+    rim = (cv2.dilate(closed, np.ones((3, 3), np.uint8)) > closed) & (frame.depth == 0)
+    closed[rim] = ~_looks_like_table(frame.color[rim], frame.color[_every(5)][on_table])
     closed[frame.robot] = 0
     _, label, stats, _ = cv2.connectedComponentsWithStats(closed, connectivity=4)
     z = float(np.median(frame.depth[mask])) if mask.any() else 1.0

@@ -169,9 +169,8 @@ def segment(
         label = carry_labels(pair, now.decided, now.motion_of, above_1.mask, drawn)
     else:
         raise ValueError(f"no propagation {parameters.propagation!r}: choose reference or flow")
-    if parameters.memory:
-        now = replace(now, hidden=remember(now.memory, pair, now.decided, now.motion_of))
-    return replace(now, sequence=pair.current.sequence, label=label)
+    hidden = remember(now.memory, pair, now.decided, now.motion_of) if parameters.memory else {}
+    return replace(now, sequence=pair.current.sequence, label=label, hidden=hidden)
 
 
 def push_by_flow(label: NDArray[np.uint16], optical_flow: NDArray[np.float32]) -> NDArray[np.uint16]:
