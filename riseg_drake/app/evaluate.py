@@ -84,7 +84,10 @@ def evaluate(tasks: Sequence[SceneTask], pool: Pool, last_step: int, console: Co
     todo = [task for task in tasks if not is_finished(task)]
     failures: dict[Path, str] = {}
     console.print(_plan(tasks, todo, folder))
-    with _interruption_told(tasks), EvaluationProgress(len(tasks), len(tasks) - len(todo), console) as progress:
+    with (
+        _interruption_told(folder, about, tasks),
+        EvaluationProgress(len(tasks), len(tasks) - len(todo), console) as progress,
+    ):
         for outcome in pool(todo):
             failures[outcome.task.folder] = outcome.failure
             progress.tell(read_result(outcome.task, outcome.failure), outcome.seconds)
@@ -129,18 +132,22 @@ def _require_same(folder: Path, settings: Mapping[str, Any]) -> None:
 
 def _plan(tasks: Sequence[SceneTask], todo: Sequence[SceneTask], folder: Path) -> str:
     seeds = f"seeds {tasks[0].seed} to {tasks[-1].seed}" if len(tasks) > 1 else f"seed {tasks[0].seed}"
-    scenes = "1 scene" if len(tasks) == 1 else f"{len(tasks)} scenes"
     done = len(tasks) - len(todo)
-    before = f", {done} of them finished before" if done else ""
-    return f"{tasks[0].scenario_name}, {scenes}, {seeds}{before}; results in {folder}"
+    before = f", {done} finished before" if done else ""
+    return f"{tasks[0].scenario_name}, {_count(len(tasks))}, {seeds}{before}; results in {folder}"
+
+
+def _count(scenes: int) -> str:
+    return "1 scene" if scenes == 1 else f"{scenes} scenes"
 
 
 @contextmanager
-def _interruption_told(tasks: Sequence[SceneTask]) -> Iterator[None]:
+def _interruption_told(folder: Path, about: Mapping[str, Any], tasks: Sequence[SceneTask]) -> Iterator[None]:
     """After Ctrl-C, say what is there and how to go on."""
     try:
         yield
     except KeyboardInterrupt:
+        write_text(folder / SUMMARY, to_json({**about, "state": "interrupted"}))
         done = sum(map(is_finished, tasks))
         raise KeyboardInterrupt(
             f"{done} of {len(tasks)} scenes are finished; the same command goes on from there"
@@ -195,9 +202,6 @@ def _by_step(scores: Sequence[Sequence[Any]], last_step: int) -> list[dict[str, 
 
 
 def _print_scores(results: Sequence[SceneResult], last_step: int, console: Console) -> None:
-    rows = [
-        (f"{method}, step {last_step}", step_means(scores, last_step)[-1])
-        for method, scores in scores_by_method(results).items()
-    ]
-    console.print(f"\nmeans over {len(results)} scene{'s' if len(results) > 1 else ''}, in percent")
+    rows = [(method, step_means(scores, last_step)[-1]) for method, scores in scores_by_method(results).items()]
+    console.print(f"\nafter the last interaction, means over {_count(len(results))}, in percent")
     console.print(score_table(rows, first="\nmethod"))

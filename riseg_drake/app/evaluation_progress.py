@@ -35,7 +35,7 @@ class EvaluationProgress:
             return
         last = scene.scores[-1]
         self._console.print(
-            f"{scene.name}, seed {scene.seed}: {scene.interactions} interactions, "
+            f"{scene.name}, seed {scene.seed}, step {scene.interactions}: "
             f"{last.objects_found:g} of {last.objects_true:g} found, "
             f"Overlap F {100 * last.overlap_f:.1f} %, {seconds:.0f} s",
             highlight=False,

@@ -1,8 +1,9 @@
 """Many scenes at once: in processes of this machine, or on a Dask cluster. The scene is the unit of work."""
 
 import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -40,7 +41,7 @@ def local_pool(jobs: int, work: Work = work_on) -> Pool:
         left = {task.folder: replace(task, threads=threads) for task in tasks}
         while left:
             try:
-                for outcome in _parallel(_Deaf(work), list(left.values()), jobs):
+                for outcome in _parallel(work, list(left.values()), jobs):
                     del left[outcome.task.folder]
                     yield outcome
             except TerminatedWorkerError:
@@ -63,7 +64,7 @@ def cluster_pool(address: str, work: Work = work_on) -> Pool:
     except ImportError:
         raise ClusterError("--dask needs Dask: pip install 'riseg-drake[dask]'") from None
     try:
-        client = Client(address, timeout=10)
+        client = Client(address, timeout=5)
     except (OSError, ValueError) as error:
         raise ClusterError(f"no Dask scheduler answers at {address} ({type(error).__name__})") from None
 
@@ -83,29 +84,32 @@ def cluster_pool(address: str, work: Work = work_on) -> Pool:
     return outcomes
 
 
-class _Deaf:
-    """Work that does not hear Ctrl-C: it is the parent's to end its processes."""
-
-    def __init__(self, work: Work):
-        self._work = work
-
-    def __call__(self, task: SceneTask) -> SceneOutcome:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        return self._work(task)
+@contextmanager
+def _deaf_children() -> Iterator[None]:
+    """Processes begun in here never hear Ctrl-C: it is their parent's to end them."""
+    if threading.current_thread() is not threading.main_thread():  # others may not touch signals
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # children inherit that it is ignored
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _parallel(work: Work, tasks: Sequence[SceneTask], jobs: int) -> Iterator[SceneOutcome]:
     with parallel_config(backend="loky", n_jobs=jobs, inner_max_num_threads=tasks[0].threads):
-        outcomes = Parallel(return_as="generator_unordered", batch_size=1)(
-            delayed(work)(task) for task in tasks
-        )
+        with _deaf_children():
+            outcomes = Parallel(return_as="generator_unordered", batch_size=1)(
+                delayed(work)(task) for task in tasks
+            )
         with closing(outcomes):  # ends the processes, too, if nobody wants the rest
             yield from outcomes
 
 
 def _alone(task: SceneTask, work: Work) -> SceneOutcome:
     try:
-        (outcome,) = _parallel(_Deaf(work), [task], jobs=2)  # with one job it would not be a process apart
+        (outcome,) = _parallel(work, [task], jobs=2)  # with one job it would not be a process apart
     except TerminatedWorkerError:
         failure = "its process died; it was out of memory, or the renderer broke"
         note_death(task, failure)

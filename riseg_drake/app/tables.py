@@ -24,9 +24,13 @@ def score_table(rows: Iterable[tuple[str, Scores]], first: str) -> Table:
             scores.boundary_f,
             scores.found_share,
         )
-        objects = f"{scores.objects_found:g} of {scores.objects_true:g}"
+        objects = f"{_count(scores.objects_found)} of {_count(scores.objects_true)}"
         table.add_row(name, *(f"{100 * share:.1f}" for share in shares), objects)
     return table
+
+
+def _count(number: float) -> str:
+    return f"{number:g}" if number % 1 == 0 else f"{number:.1f}"
 
 
 def stage_table(stages: Mapping[str, Mapping[str, float]], title: str) -> Table:

@@ -109,7 +109,7 @@ Baseline = Callable[
     [NDArray[np.uint8], NDArray[np.float32], NDArray[np.bool_], Intrinsics, BaselineParameters],
     NDArray[np.uint16],
 ]
-BASELINES: dict[str, Baseline] = {"depth clusters": depth_clusters, "colour-depth graph": graph_segments}
+BASELINES: dict[str, Baseline] = {"depth clusters": depth_clusters, "RGB-D graph": graph_segments}
 """By the name that reports give them."""
 
 

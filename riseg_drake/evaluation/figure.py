@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from riseg_drake.evaluation.published import PUBLISHED
 from riseg_drake.evaluation.scene_result import OURS, SceneResult, scores_by_method
@@ -47,7 +48,9 @@ def draw_figure(scenes: Sequence[SceneResult], last_step: int, file: Path) -> No
     axes.plot(steps, means, "o-", color=_OURS_COLOR, lw=2.4, ms=5, label=OURS)
 
     axes.set(xlabel="interaction step i", ylabel="objects with Overlap F > 75 %, in percent")
-    axes.set(xlim=(-0.1, last_step + 0.1), ylim=(-2, 102), xticks=steps)
+    last_published = max(map(len, PUBLISHED.values())) - 1
+    axes.set(xlim=(-0.15, max(last_step, last_published) + 0.15), ylim=(-2, 102))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.grid(axis="y", lw=0.5, alpha=0.5)
     handles, labels = axes.get_legend_handles_labels()
     order = sorted(range(len(labels)), key=lambda n: not labels[n].startswith((OURS, "±")))

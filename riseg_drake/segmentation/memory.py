@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import back_project
-from riseg_drake.geometry.rgbd import Frame, FramePair
+from riseg_drake.geometry.rgbd import Frame, FramePair, unhidden_depth
 from riseg_drake.geometry.se3 import inverse, move_points
 from riseg_drake.segmentation.association import UNKNOWN
 from riseg_drake.segmentation.propagation import pixels_of
@@ -55,7 +55,7 @@ def remember(
     label_0: NDArray[np.uint16],
     motion_of: Mapping[int, NDArray],
 ) -> dict[int, NDArray[np.float64]]:
-    """What the current frame no longer sees of each object: out of the view, or behind the robot.
+    """What the current frame no longer sees of each object.
 
     Args:
         memory: what the reference frame did not see, at that time.
@@ -81,8 +81,15 @@ def remember(
 
 
 def _out_of_sight(p_WQ: NDArray, frame: Frame) -> NDArray[np.bool_]:
-    """Which points [N, 3] lie outside the frame's view or behind the robot."""
-    vu, inside = pixels_of(move_points(inverse(frame.X_WC), p_WQ), frame.intrinsics)
+    """Which points [N, 3] the frame does not see: out of the view, behind something, or without depth.
+
+    A stereo camera has no depth beside near things. A point through which the frame looks at something
+    further away is not hidden: it is no longer there.
+    """
+    p_CQ = move_points(inverse(frame.X_WC), p_WQ)
+    vu, inside = pixels_of(p_CQ, frame.intrinsics)
     hidden = ~inside
-    hidden[inside] = frame.robot[vu[inside, 0], vu[inside, 1]]
+    v, u = vu[inside].T
+    depth = unhidden_depth(frame)[v, u]
+    hidden[inside] = (depth == 0) | (depth < p_CQ[inside, 2] - _DEPTH_AGREES)
     return hidden

@@ -85,8 +85,8 @@ def label_by_motion(
     of_pixel = pieces.label[inside]
     pixel = (inside[0] + region[0].start, inside[1] + region[1].start)
     cost = motion_costs(pair, pixel, motions, noise, depth_noise, parameters)
-    unary = np.stack([np.bincount(of_pixel, c, pieces.count) for c in cost], axis=1)
-    unary = unary / parameters.correlated_pixels
+    sums = [np.bincount(of_pixel, c, pieces.count) for c in cost]
+    unary = np.stack(sums, axis=1) / parameters.correlated_pixels
     pixels = np.bincount(of_pixel, minlength=pieces.count)
     weight = parameters.border * pieces.length * np.exp(-pieces.contrast / parameters.contrast)
     label = _fewest_labels(unary, pixels, pieces, weight, parameters)

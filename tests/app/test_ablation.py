@@ -1,0 +1,89 @@
+import json
+from functools import reduce
+
+import cv2
+import numpy as np
+import pytest
+
+from riseg_drake.app import ablation
+from riseg_drake.app.ablation import LITERAL, SWITCHES, ablate, switched, versions
+from riseg_drake.app.cli import main
+from riseg_drake.app.replay import Replay
+from riseg_drake.app.scenario import Scenario, load_scenario
+from riseg_drake.recording.layout import RecordingError
+from riseg_drake.recording.reader import RecordingReader
+from riseg_drake.robot.kinematics import PandaKinematics
+
+
+def value(scenario, path):
+    return reduce(getattr, path.split("."), scenario)
+
+
+@pytest.mark.parametrize("name", SWITCHES)
+def test_a_switch_changes_what_this_version_does(name):
+    scenario = Scenario()
+    for path, literal in SWITCHES[name].items():
+        assert value(scenario, path) != literal
+        assert type(value(scenario, path)) is type(literal)
+        assert value(switched(scenario, SWITCHES[name]), path) == literal
+
+
+def test_a_switched_scenario_is_a_copy():
+    scenario = Scenario()
+    switched(scenario, versions()[LITERAL])
+    assert scenario.bfif.frames.kind == "patches"
+    assert scenario.segment.memory
+
+
+def test_the_literal_paper_has_every_switch():
+    assert versions()[LITERAL].items() >= set().union(*(switch.items() for switch in SWITCHES.values()))
+
+
+def test_a_switch_that_does_not_exist_is_an_error():
+    with pytest.raises(ValueError, match=r"no key 'bfif\.frame'"):
+        switched(Scenario(), {"bfif.frame": 1})
+
+
+@pytest.fixture(scope="module")
+def recorded(small_scenario, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recorded")
+    assert main(["run", str(small_scenario), "--seed", "1", "--record", "--output", str(folder)]) == 0
+    return folder
+
+
+def steps(folder):
+    return json.loads((folder / "summary.json").read_text())["steps"]
+
+
+@pytest.mark.renders
+def test_a_replay_gives_the_masks_of_the_run_itself(recorded, small_scenario):
+    scenario = load_scenario(small_scenario)
+    replay = Replay(scenario, PandaKinematics(scenario.station.panda), seed=1)
+    masks = {round(f.time, 6): replay.mask_after(f).copy() for f in RecordingReader(recorded / "recording")}
+    for step in steps(recorded):
+        written = cv2.imread(str(recorded / f"step_{step['step']}" / "mask.png"), cv2.IMREAD_UNCHANGED)
+        np.testing.assert_array_equal(masks[step["time_s"]], written)
+    assert written.any()
+
+
+@pytest.mark.renders
+def test_each_version_is_scored_at_the_steps_of_the_run(recorded, small_scenario, monkeypatch):
+    scenario = load_scenario(small_scenario)
+    monkeypatch.setattr(ablation, "versions", lambda: {"as it is": {}})
+    times = [step["time_s"] for step in steps(recorded)]
+    result = ablate(scenario, 1, recorded / "recording", times)
+    own = [step["scores"] for step in steps(recorded)]
+    assert [scores.as_dict() for scores in result.scores["as it is"]] == [pytest.approx(each) for each in own]
+    with pytest.raises(RecordingError, match=r"no frame at 1000\.0 s"):
+        ablate(scenario, 1, recorded / "recording", [1000.0])
+
+
+@pytest.mark.renders
+def test_a_version_that_fails_on_the_way_keeps_what_it_had(recorded, small_scenario, monkeypatch):
+    scenario = load_scenario(small_scenario)
+    broken = {"segment.outline": "freehand"}
+    monkeypatch.setattr(ablation, "versions", lambda: {"broken": broken})
+    times = [step["time_s"] for step in steps(recorded)]
+    result = ablate(scenario, 1, recorded / "recording", times)
+    assert len(result.scores["broken"]) < len(times)
+    assert "choose motion or flow" in result.failures["broken"]

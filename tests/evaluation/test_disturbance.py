@@ -1,0 +1,111 @@
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from riseg_drake.evaluation.disturbance import (
+    Disturbance,
+    ObjectMotion,
+    disturbance_of_all,
+    disturbance_of_steps,
+    motion_between,
+    object_at,
+)
+from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.geometry.rgbd import Frame
+
+
+def turned(X_WB, axis, degrees):
+    out = X_WB.copy()
+    out[:3, :3] = Rotation.from_euler(axis, degrees, degrees=True).as_matrix() @ X_WB[:3, :3]
+    return out
+
+
+def moved(X_WB, *p):
+    out = X_WB.copy()
+    out[:3, 3] += p
+    return out
+
+
+def test_turning_on_the_table_is_no_tilt_and_leaning_is():
+    X_WB0 = turned(turned(np.eye(4), "x", 17), "y", -11)
+    before = {"a": X_WB0, "b": X_WB0}
+    after = {"a": moved(turned(X_WB0, "z", 70), 0.03, 0.04, 0), "b": turned(X_WB0, "y", 10)}
+    motions = motion_between(before, before, after)
+    assert motions["a"].moved_m == pytest.approx(0.05)
+    assert motions["a"].tilted_deg == pytest.approx(0, abs=1e-5)
+    assert motions["b"].tilted_deg == pytest.approx(10)
+
+
+def test_small_tilts_add_up_to_one_since_the_start():
+    start = {"a": np.eye(4)}
+    before = {"a": turned(np.eye(4), "x", 15)}
+    motion = motion_between(start, before, {"a": turned(np.eye(4), "x", 25)})["a"]
+    assert motion.tilted_deg == pytest.approx(10)
+    assert motion.tilted_in_all_deg == pytest.approx(25)
+
+
+@pytest.mark.parametrize(
+    ("height", "fall", "left"),
+    [(0.04, 0.0, False), (0.04, 0.05, False), (0.04, 0.07, True), (-0.1, 0.01, False), (-0.1, 0.03, True)],
+    ids=["stands", "lies flat", "fell", "origin below the body", "that one fell"],
+)
+def test_only_what_is_lower_than_the_table_has_left_it(height, fall, left):
+    start = {"a": moved(np.eye(4), 0, 0, height)}
+    after = {"a": moved(start["a"], 0, 0, -fall)}
+    assert motion_between(start, start, after)["a"].left_table is left
+
+
+def test_a_push_goes_for_the_object_whose_surface_is_nearest_to_the_contact():
+    intrinsics = Intrinsics(64, 48, 60.0, 60.0, 31.5, 23.5)
+    X_WC = np.diag([1.0, -1.0, -1.0, 1.0])  # looks down from half a metre
+    X_WC[:3, 3] = [0.4, 0.1, 0.5]
+    labels = np.zeros(intrinsics.shape, np.uint16)
+    labels[10:20, 10:20] = 1
+    labels[10:20, 30:60] = 2
+    depth = np.full(intrinsics.shape, 0.45, np.float32)
+    frame = Frame(0, 0.0, intrinsics, np.zeros((48, 64, 3), np.uint8), depth, X_WC, np.zeros((48, 64), bool))
+    beside_two = np.array([0.4 + (28 - 31.5) / 60 * 0.45, 0.1 - (15 - 23.5) / 60 * 0.45, 0.01])
+    beside_one = np.array([0.4 + (21 - 31.5) / 60 * 0.45, 0.1 - (15 - 23.5) / 60 * 0.45, 0.01])
+    assert object_at(beside_two, frame, labels) == 2
+    assert object_at(beside_one, frame, labels) == 1
+    assert object_at(beside_one, frame, np.zeros_like(labels)) is None
+
+
+def disturbance(pushed, **moved_mm):
+    return Disturbance(pushed, {name: ObjectMotion(mm / 1000, 0.0) for name, mm in moved_mm.items()})
+
+
+def test_pushed_objects_have_a_mean_and_the_others_a_median():
+    scenes = [
+        [disturbance("a", a=20, b=1, c=3)],
+        [disturbance("b", a=90, b=10, c=2), disturbance("c", a=0, b=0, c=5)],
+    ]
+    first, second = disturbance_of_steps(scenes, last_step=2)
+    assert (first.interactions, second.interactions) == (2, 1)
+    assert first.pushed_mean_m == pytest.approx(0.015)
+    assert first.others_median_m == pytest.approx(0.0025)
+    assert second.pushed_mean_m == pytest.approx(0.005)
+    everything = disturbance_of_all(scenes)
+    assert everything.interactions == 3
+    assert everything.pushed_mean_m == pytest.approx(0.035 / 3)
+    assert everything.others_median_m == pytest.approx(0.0015)
+
+
+def test_what_topples_or_falls_is_counted_once():
+    def state(tilt, left):
+        return Disturbance("a", {"a": ObjectMotion(0.01, 0.0, tilt, left), "b": ObjectMotion(0.0, 0.0, 3.0)})
+
+    scene = [state(20.0, False), state(21.0, False), state(90.0, True), state(95.0, True)]
+    steps = disturbance_of_steps([scene], last_step=4)
+    assert [figures.toppled for figures in steps] == [0, 1, 0, 0]
+    assert [figures.left_table for figures in steps] == [0, 0, 1, 0]
+    assert disturbance_of_all([scene]).toppled == 1
+    assert disturbance_of_all([scene]).tilt_max_deg == 95.0
+
+
+def test_where_nothing_was_done_there_are_no_figures():
+    figures = disturbance_of_all([[], []])
+    assert figures.interactions == 0
+    assert math.isnan(figures.pushed_mean_m)
