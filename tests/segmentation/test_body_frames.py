@@ -126,7 +126,7 @@ def test_a_small_thing_gets_frames_beside_a_big_one(scene) -> None:
     moving[60:180, 20:120] = True
     small = np.zeros_like(moving)
     small[60:84, 200:224] = True
-    for seed in range(20):
+    for seed in range(60):
         frames = sample(scene, moving | small, seed=seed, diameter=0.012)
         assert np.count_nonzero(small[tuple(frames.pixel.T)]) >= 3
 

@@ -86,8 +86,8 @@ def test_nothing_is_drawn_where_the_object_is_no_longer() -> None:
 class Watched:
     """Alg. 2 on a drawn scene in which the first box is pushed until it has an id, and then is seen anew."""
 
-    def __init__(self) -> None:
-        self.algorithm = Algorithm()
+    def __init__(self, memory: bool = True) -> None:
+        self.algorithm = Algorithm(segment=SegmentParameters(memory=memory))
         self.rng, self.sequence = np.random.default_rng(0), 0
         for k in range(7):
             self.look(at=[planar(-0.05, 0.0018 * k, 0.3), PLACES[1]])
@@ -96,12 +96,10 @@ class Watched:
         (self.id,) = self.algorithm.answer.object_ids
         self.assert_it_is_seen()
 
-    def copy(self, **parameters) -> "Watched":
+    def copy(self) -> "Watched":
         """From here on, without a trace in this one."""
         other = copy(self)
-        other.algorithm = replace(
-            self.algorithm, above=dict(self.algorithm.above), segment=SegmentParameters(**parameters)
-        )
+        other.algorithm = replace(self.algorithm, above=dict(self.algorithm.above))
         other.rng = np.random.default_rng(1)
         return other
 
@@ -135,8 +133,8 @@ def test_an_object_that_leaves_the_view_comes_back_with_its_id(pushed_once: Watc
     watched.assert_it_is_seen()
 
 
-def test_without_memory_it_comes_back_unknown(pushed_once: Watched) -> None:
-    watched = pushed_once.copy(memory=False)
+def test_without_memory_it_comes_back_unknown() -> None:
+    watched = Watched(memory=False)
     for x in AWAY_AND_BACK:
         watched.look(x)
     assert not watched.mask.any()

@@ -86,11 +86,12 @@ def test_a_blank_body_is_not_shared_out_among_motions(blank_moves) -> None:
 @pytest.mark.renders
 def test_motions_that_hardly_differ_from_its_own_take_nothing_of_a_blank_body(blank_moves) -> None:
     X = blank_moves.motion_C0[2]
-    beside = {n: np.array(X) for n in (4, 5)}
-    beside[4][:2, 3] += [0.0015, 0.0]
-    beside[5][:2, 3] += [-0.001, 0.0015]
-    seeds = blank_moves.label_0.copy()
-    seeds[:10, :10], seeds[:10, 20:30] = 4, 5
+    # By half a pixel to each side.
+    beside, seeds = {}, blank_moves.label_0.copy()
+    for n, step in enumerate([(3e-4, 0.0), (-3e-4, 0.0), (0.0, 3e-4), (0.0, -3e-4)], 4):
+        beside[n] = np.array(X)
+        beside[n][:2, 3] += step
+        seeds[:10, 20 * n : 20 * n + 10] = n
     mask = labelled(blank_moves.pair, seeds, blank_moves.motion_C0 | beside)
     counts = np.unique(mask[blank_moves.label_1 == 2], return_counts=True)[1]
     assert counts.max() > 0.9 * counts.sum()
