@@ -84,8 +84,12 @@ def zero_motion_evidence(
     I_0, I_1 = smooth_gray(pair.reference.color[region]), smooth_gray(pair.current.color)
     variance = gray_variance(I_0, noise)
     uv = pixel_grid(*pair.current.intrinsics.shape)[region]
-    worse = np.zeros_like(I_0)
+    robot_1 = pair.current.robot.astype(np.uint8)
+    worse, hidden = np.zeros_like(I_0), np.zeros(I_0.shape, bool)
     for sign, flow in ((1.0, np.nan_to_num(expected_flow[region])), (-1.0, optical_flow[region])):
         warped = cv2.remap(I_1, uv + flow, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         worse += np.float32(sign) * np.minimum((warped - I_0) ** 2 / variance, _COST_MAX)
+        hidden |= cv2.remap(robot_1, uv + flow, None, cv2.INTER_NEAREST) > 0
+    # Behind the robot nothing can be compared, and flow invents something that fits.
+    worse[hidden] = 0
     return cv2.boxFilter(worse, -1, (window, window))

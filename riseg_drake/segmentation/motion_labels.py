@@ -28,6 +28,11 @@ from riseg_drake.segmentation.superpixels import Superpixels, superpixels
 _ROW = 256
 """Pixels are handed to OpenCV in rows of so many: it wants images, and none longer than 32767."""
 
+_NO_EVIDENCE = np.float32(2)
+"""The cost that is expected of a match."""
+_RIM = np.ones((7, 7), np.uint8)
+"""Three pixels on each side of an outline are blurred, interpolated across it, or without true depth."""
+
 
 @dataclass
 class MotionLabelParameters:
@@ -85,6 +90,9 @@ def label_by_motion(
     of_pixel = pieces.label[inside]
     pixel = (inside[0] + region[0].start, inside[1] + region[1].start)
     cost = motion_costs(pair, pixel, motions, noise, depth_noise, parameters)
+    # On the rim a pixel sees half of what is behind it: no motion explains that, least of all the right one.
+    core = cv2.erode((pieces.label >= 0).astype(np.uint8), _RIM, borderValue=0)[inside] > 0
+    cost[:, ~core] = _NO_EVIDENCE
     sums = [np.bincount(of_pixel, c, pieces.count) for c in cost]
     unary = np.stack(sums, axis=1) / parameters.correlated_pixels
     pixels = np.bincount(of_pixel, minlength=pieces.count)
@@ -156,6 +164,6 @@ def motion_costs(
         geometric = np.minimum(((z_1 - z_expected) / sigma) ** 2, cost_max)
         both = photometric + np.where(z_1 > 0, geometric, np.float32(1))
         # What cannot be compared speaks neither for nor against: the value expected of a match.
-        both[hidden | ~np.isfinite(both)] = 2.0
+        both[hidden | ~np.isfinite(both)] = _NO_EVIDENCE
         cost[k] = both.ravel()[:count]
     return cost

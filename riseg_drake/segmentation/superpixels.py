@@ -50,17 +50,18 @@ def superpixels(
     v, u = np.nonzero(seeds & mask)
     markers[v, u] = np.arange(len(v)) + 1
     markers[~mask] = len(v) + 1
-    flooded = cv2.watershed(image, markers).astype(np.float32)
-    flooded[~mask] = 0
-    # Watershed leaves ridges of one pixel between basins; a neighbour takes them.
-    for _ in range(2):
-        ridge = mask & (flooded <= 0)
-        flooded[ridge] = cv2.dilate(np.where(flooded == len(v) + 1, 0, flooded), _CROSS)[ridge]
-    label = np.where(mask & (flooded <= len(v)), flooded, 0).astype(np.intp) - 1
+    flooded = cv2.watershed(image, markers)
+    own = mask & (flooded > 0) & (flooded <= len(v))
+    own[v, u] = True
+    flooded[v, u] = np.arange(len(v)) + 1
+    # Ridges between basins, and rims that the outside has flooded, go to the nearest piece.
+    _, index = cv2.distanceTransformWithLabels(
+        (~own).astype(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    nearest = np.zeros(index.max() + 1, np.intp)
+    nearest[index[own]] = flooded[own]
+    label = np.where(mask, nearest[index], 0) - 1
     return _with_borders(label, len(v), image)
-
-
-_CROSS = np.ones((3, 3), np.uint8)
 
 
 def _edges_image(color: NDArray[np.uint8], height: NDArray[np.float32]) -> NDArray[np.uint8]:

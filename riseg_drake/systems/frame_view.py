@@ -51,9 +51,7 @@ class FrameView(LeafSystem):
         if color.width() == 0 or depth.width() == 0:  # no message has come yet
             output.set_value(None)
             return
-        if (color.height(), color.width()) != self._intrinsics.shape or depth.size() != color.width() * (
-            color.height()
-        ):
+        if {(image.height(), image.width()) for image in (color, depth)} != {self._intrinsics.shape}:
             raise ValueError(
                 f"images of {color.width()}x{color.height()} (colour) and {depth.width()}x{depth.height()} "
                 f"(depth), but the intrinsics are for {self._intrinsics.width}x{self._intrinsics.height}"

@@ -1,5 +1,7 @@
 """X_t = O_t - E_t: nothing where only the camera moves, the body where a body moves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -97,3 +99,13 @@ def test_with_the_true_flow_the_body_is_found_nearly_whole() -> None:
 def test_a_mask_without_a_pixel_has_none_that_moves() -> None:
     pair, label_0, _ = DrawnScene(SIZES).pair(CAMERAS, (PLACES, SHIFTED))
     assert not moving(pair, np.zeros_like(label_0)).any()
+
+
+def test_what_the_robot_comes_to_hide_does_not_move() -> None:
+    scene = DrawnScene(SIZES)
+    pair, label_0, _ = scene.pair(CAMERAS, (PLACES, PLACES), np.random.default_rng(6))
+    robot = np.zeros(CAMERA.shape, bool)
+    robot[:, :120] = True
+    current, _ = scene.frame(1, CAMERAS[1], PLACES, np.random.default_rng(7), robot)
+    assert np.any(robot & (label_0 == 1))
+    assert not moving(replace(pair, current=current), label_0).any()

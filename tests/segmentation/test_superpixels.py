@@ -118,3 +118,12 @@ def test_a_border_on_a_blank_surface_has_no_contrast_and_one_on_an_edge_has() ->
 def test_unknown_height_is_no_obstacle() -> None:
     height = np.full((HEIGHT, WIDTH), np.nan, np.float32)
     assert (cut(flat(), np.ones((HEIGHT, WIDTH), bool), 8, height).label >= 0).all()
+
+
+@pytest.mark.parametrize("size", [3, 6, 15])
+@pytest.mark.parametrize("color", [flat(), textured()], ids=["blank", "textured"])
+def test_the_pieces_cover_the_mask_and_nothing_else(color: np.ndarray, size: int) -> None:
+    mask = blob()
+    pieces = cut(color, mask, size)
+    np.testing.assert_array_equal(pieces.label >= 0, mask)
+    assert pieces.label.max() < pieces.count

@@ -87,7 +87,7 @@ def test_before_the_first_image_there_is_no_frame(sizes: tuple[int, int]) -> Non
     assert seen(*images(*sizes, depth_size=(0, 0))) is None
 
 
-@pytest.mark.parametrize(("color_size", "depth_size"), [((8, 6), (8, 6)), ((6, 4), (12, 8))])
+@pytest.mark.parametrize(("color_size", "depth_size"), [((8, 6), (8, 6)), ((6, 4), (12, 8)), ((6, 4), (4, 6))])
 def test_images_of_another_size_are_refused_with_all_sizes(color_size, depth_size) -> None:
     with pytest.raises(ValueError, match="6x4") as error:
         seen(*images(*color_size, depth_size=depth_size))
