@@ -23,6 +23,9 @@ class _Parser(argparse.ArgumentParser):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns its exit code: 0 done, 2 bad input, 130 interrupted."""
     chosen = _parser().parse_args(arguments)
+    # Before numpy is imported: on matrices of six by six the threads of linear algebra only wait for each
+    # other, and sums that they share come out differently in their last bits.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         # Commands are imported when called: `riseg --help` shall not wait for Drake.
         chosen.call(chosen, Console())

@@ -147,7 +147,7 @@ def segment(
     """
     if before.sequence == pair.current.sequence:
         return before
-    now = _renew_reference(before, pair, above_0, parameters)
+    now = _renew_reference(before, pair, above_0)
     if len(groups):
         starts = pair.current.time - before.last_motion > parameters.episode_gap
         now = replace(now, last_motion=pair.current.time, episode=now.episode + int(starts))
@@ -183,9 +183,7 @@ def push_by_flow(label: NDArray[np.uint16], optical_flow: NDArray[np.float32]) -
     return out
 
 
-def _renew_reference(
-    before: Segmentation, pair: FramePair, above_0: AboveTable, parameters: SegmentParameters
-) -> Segmentation:
+def _renew_reference(before: Segmentation, pair: FramePair, above_0: AboveTable) -> Segmentation:
     """What is known at this pair's reference frame."""
     if pair.reference.sequence == before.reference_sequence:
         return before
@@ -248,7 +246,7 @@ def _decide(
             next_id=max([now.next_id - 1, *ids]) + 1,
         )
     z = pair.reference.depth[above_0.mask]
-    pixels_per_metre = pair.current.intrinsics.fx / float(np.median(z[z > 0]))
+    pixels_per_metre = pair.current.intrinsics.fx / max(float(np.median(z)), 1e-3)
     region = bounding_region(now.known.label > 0, margin=1)
     gaps = motion_gaps(_points(groups, pair, above_0), motions, pair.current.intrinsics.fx)
     association = associate(
