@@ -7,6 +7,9 @@ import pytest
 from riseg_drake.app.cli import main
 from riseg_drake.app.scenario import Scenario, load_scenario
 
+# The command first tries whether images can be drawn, and settles the scene.
+pytestmark = pytest.mark.renders
+
 
 def test_the_built_in_scenario_is_what_the_dataclasses_say():
     # One truth: the file shows and explains defaults, it does not change them.
