@@ -66,7 +66,7 @@ def add_segmentation(
     wire(memory, "pair", expected, optical, grouper, propagator)
     wire(expected, "expected_flow", grouper, propagator)  # lines 1
     wire(optical, "optical_flow", grouper, propagator)  # and 2
-    wire(memory, "above_table_reference", grouper, port="above_table")
+    wire(memory, "above_table_reference", optical, grouper, port="above_table")
     wire(memory, "above_table_reference", propagator)
     wire(memory, "above_table", propagator)
     wire(grouper, "groups", propagator)  # lines 3 to 6, and 7

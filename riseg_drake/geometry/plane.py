@@ -70,9 +70,11 @@ def fit_plane(
     if not len(planes):
         raise ValueError("no plane: all triplets drawn lie on a line or face away from the prior")
 
-    heights = planes[:, :3] @ p_CQ[:scoring].T + planes[:, 3:]
-    on = np.count_nonzero(np.abs(heights) <= tolerance[:scoring], axis=1)
-    below = np.count_nonzero(heights < -tolerance[:scoring], axis=1)
+    heights = planes[:, :3].astype(np.float32) @ p_CQ[:scoring].T.astype(np.float32)
+    heights += planes[:, 3:].astype(np.float32)
+    heights /= tolerance[:scoring].astype(np.float32)
+    on = np.count_nonzero(np.abs(heights) <= 1, axis=1)
+    below = np.count_nonzero(heights < -1, axis=1)
     plane_C = planes[np.argmax(on - parameters.below_penalty * below)]
 
     for _ in range(2):

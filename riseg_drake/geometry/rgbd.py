@@ -1,8 +1,10 @@
 """What the algorithm sees at one moment: I_t with the kinematics that belong to it."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,6 +43,21 @@ class Frame(Immutable):
     robot: NDArray[np.bool_]
     """[H, W], the pixels that the robot itself covers."""
 
+    @cached_property
+    def gray(self) -> NDArray[np.float32]:
+        """Gray values [H, W], 0..255, as `smooth_gray` makes them; worked out once for all stages."""
+        return smooth_gray(self.color)
+
+    @cached_property
+    def unhidden_gray(self) -> NDArray[np.float32]:
+        """The same with NaN where the robot is in the way."""
+        return np.where(self.robot, np.float32(np.nan), self.gray)
+
+    @cached_property
+    def unhidden_depth(self) -> NDArray[np.float32]:
+        """Depth [H, W], m, with 0 (invalid) where the robot is in the way."""
+        return np.where(self.robot, np.float32(0), self.depth)
+
 
 @dataclass(frozen=True)
 class FramePair(Immutable):
@@ -55,12 +72,13 @@ class FramePair(Immutable):
         return np.linalg.inv(self.current.X_WC) @ self.reference.X_WC
 
 
-def unhidden_depth(frame: Frame) -> NDArray[np.float32]:
-    """The frame's depth [H, W], m, with 0 (invalid) where the robot is in the way."""
-    return np.where(frame.robot, np.float32(0), frame.depth)
+def smooth_gray(color: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Gray values [H, W], 0..255, of colours [H, W, 3], smoothed enough to be interpolated between pixels."""
+    gray = cv2.cvtColor(color, cv2.COLOR_RGB2GRAY)
+    return cv2.GaussianBlur(gray, (0, 0), 0.7).astype(np.float32)
 
 
 def sanitize_depth(depth: NDArray) -> NDArray[np.float32]:
     """Depth in metres as float32 with every spelling of "invalid" (NaN, inf, < 0) turned into 0."""
     depth = np.asarray(depth, np.float32)
-    return np.where(np.isfinite(depth) & (depth > 0), depth, np.float32(0))
+    return np.where((depth > 0) & (depth < np.inf), depth, np.float32(0))

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.geometry.camera import Intrinsics, bounding_region
 from riseg_drake.geometry.plane import (
     PlaneFitParameters,
     fit_plane,
@@ -48,6 +49,12 @@ class AboveTable(Immutable):
     """[4], n . p_WQ + d is the height of Q above the table; n points up."""
     depth_noise: float
     """Standard deviation of depth at 1 m, as the table itself shows it (m); grows with depth squared."""
+    distance: float
+    """Median depth of what stands on the table, m; 1 where nothing does."""
+
+    def pixels_per_metre(self, intrinsics: Intrinsics) -> float:
+        """How large things that stand on the table appear, about."""
+        return intrinsics.fx / self.distance
 
 
 def objects_above_table(frame: Frame, parameters: AboveTableParameters) -> AboveTable:
@@ -70,9 +77,11 @@ def objects_above_table(frame: Frame, parameters: AboveTableParameters) -> Above
         np.float32(parameters.noise_multiple * depth_noise) * frame.depth**2,
     )
     with np.errstate(invalid="ignore"):
-        mask = (height > low) & seen
-    mask = _without_specks(mask, frame, on_table, parameters.area_min)
-    return AboveTable(mask, height, transform_plane(frame.X_WC, plane_C), depth_noise)
+        high = (height > low) & seen
+    z = frame.depth[high]
+    distance = float(np.median(z)) if len(z) else 1.0
+    mask = _without_specks(high, frame, on_table, parameters.area_min / distance**2)
+    return AboveTable(mask, height, transform_plane(frame.X_WC, plane_C), depth_noise, distance)
 
 
 def _every(n: int) -> tuple[slice, slice]:
@@ -103,23 +112,29 @@ def _looks_like_table(color: NDArray[np.uint8], table_color: NDArray[np.uint8]) 
     """Which colours [N, 3] may be the table's, given M of it [M, 3]."""
     if len(table_color) < 100:
         return np.ones(len(color), bool)
-    spread = np.maximum(table_color.std(axis=0), _COLOR_SPREAD_MIN)
-    return (np.abs(color - table_color.mean(axis=0)) < _TABLE_SIGMAS * spread).all(axis=1)
+    mean, spread = cv2.meanStdDev(table_color[:, None])
+    reach = _TABLE_SIGMAS * np.maximum(spread, _COLOR_SPREAD_MIN)
+    return ((color > (mean - reach).T) & (color < (mean + reach).T)).all(axis=1)
 
 
 def _without_specks(
     mask: NDArray[np.bool_], frame: Frame, on_table: NDArray[np.bool_], area_min: float
 ) -> NDArray[np.bool_]:
-    """Close pinholes, add the rim without depth, drop connected pieces smaller than `area_min` (m^2)."""
-    closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    """Close pinholes, add the rim without depth, drop pieces that look smaller than `area_min` (m^2 at 1 m)."""
+    out = np.zeros_like(mask)
+    if not mask.any():
+        return out
+    region = bounding_region(mask, margin=2)
+    robot, depth, color = frame.robot[region], frame.depth[region], frame.color[region]
+    closed = cv2.morphologyEx(mask[region].astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     # Stereo has no depth on the last pixels before an edge, nor on the first behind it. Colour tells which
     # are the object's, where the table has a colour of its own.
-    rim = (cv2.dilate(closed, np.ones((3, 3), np.uint8)) > closed) & (frame.depth == 0)
-    closed[rim] = ~_looks_like_table(frame.color[rim], frame.color[_every(5)][on_table])
-    closed[frame.robot] = 0
+    rim = (cv2.dilate(closed, np.ones((3, 3), np.uint8)) > closed) & (depth == 0)
+    closed[rim] = ~_looks_like_table(color[rim], frame.color[_every(5)][on_table])
+    closed[robot] = 0
     _, label, stats, _ = cv2.connectedComponentsWithStats(closed, connectivity=4)
-    z = float(np.median(frame.depth[mask])) if mask.any() else 1.0
-    pixels_min = area_min * frame.intrinsics.fx * frame.intrinsics.fy / z**2
+    pixels_min = area_min * frame.intrinsics.fx * frame.intrinsics.fy
     keep = stats[:, cv2.CC_STAT_AREA] >= pixels_min
     keep[0] = False
-    return keep[label]
+    out[region] = keep[label]
+    return out

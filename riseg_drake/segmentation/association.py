@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import Region
+from riseg_drake.geometry.camera import bounding_region
 
 UNKNOWN = np.uint16(65535)
 """Label of pixels above the table that no object has claimed yet; never leaves the propagator."""
@@ -142,37 +142,39 @@ class _Decision:
     def place_unknown(self, g: int, region: NDArray[np.bool_]) -> None:
         """Whose the unknown pixels are that move with group g - 1."""
         count, piece, stats, _ = cv2.connectedComponentsWithStats(region.astype(np.uint8), connectivity=4)
-        companions = [a for a, motion in self.motion_of.items() if motion == g - 1]
-        reach = self.rim.shape[0]
-        for number in range(1, count):
-            # Around the piece only: there may be many, and most are specks.
-            u, v, width, height, area = stats[number]
-            around = (slice(max(0, v - reach), v + height + reach), slice(max(0, u - reach), u + width + reach))
-            inside = piece[around] == number
-            near = cv2.dilate(inside.astype(np.uint8), self.rim) > 0
-            neighbours = set(np.unique(self.known.label[around][near]).tolist())
-            touching = [a for a in companions if a in neighbours]
-            young = [a for a in touching if self.born[a] == self.episode]
-            if young:
-                self.label[around][inside] = young[0]
-            elif area >= self.pixels_min and self._is_solid(inside):
-                self._add_piece(inside, around, g)
-            elif touching:
-                self.label[around][inside] = touching[0]
+        owner = np.zeros(count, np.uint16)
+        solid = {
+            number
+            for number in range(1, count)
+            if stats[number, cv2.CC_STAT_AREA] >= self.pixels_min and self._is_solid(piece == number)
+        }
+        young_first = sorted(
+            (a for a, motion in self.motion_of.items() if motion == g - 1),
+            key=lambda a: self.born[a] != self.episode,
+        )
+        for a in young_first:
+            near = cv2.dilate((self.known.label == a).astype(np.uint8), self.rim) > 0
+            for number in np.unique(piece[near & region]):
+                if owner[number] == 0 and (self.born[a] == self.episode or number not in solid):
+                    owner[number] = a
+        self.label[region] = np.where(owner[piece[region]] > 0, owner[piece[region]], self.label[region])
+        for number in sorted(solid):
+            if owner[number] == 0:
+                self.pieces.append((piece == number, g))
 
     def _is_solid(self, region: NDArray[np.bool_]) -> bool:
         """Whether a region is more than a rim, and large enough."""
-        if np.count_nonzero(region) < self.pixels_min:
+        area = np.count_nonzero(region)
+        if area < self.pixels_min:
             return False
-        core = cv2.erode(region.astype(np.uint8), self.rim, borderValue=0)
-        opened = (cv2.dilate(core, self.rim) > 0) & region
-        return bool(opened.sum() >= max(self.pixels_min, 0.4 * region.sum()))
-
-    def _add_piece(self, inside: NDArray[np.bool_], around: Region, g: int) -> None:
-        """Keep a new object, given in a rectangle, for `name_pieces`."""
-        whole = np.zeros(self.label.shape, bool)
-        whole[around] = inside
-        self.pieces.append((whole, g))
+        opened = cv2.morphologyEx(
+            region[bounding_region(region)].astype(np.uint8),
+            cv2.MORPH_OPEN,
+            self.rim,
+            borderType=cv2.BORDER_CONSTANT,
+            borderValue=0,
+        )
+        return bool(np.count_nonzero(opened) >= max(self.pixels_min, 0.4 * area))
 
     def name_pieces(self) -> None:
         """Label the new objects: by the ids of the frame before where they are the same pieces."""

@@ -24,8 +24,14 @@ from riseg_drake.segmentation.motions import (
     misfits,
     settle_groups,
 )
-from riseg_drake.segmentation.noise import MeasurementNoise, flow_sigma, smooth_gray
-from riseg_drake.segmentation.twists import Twists, patch_twists, sliding_prior, triplet_twists
+from riseg_drake.segmentation.noise import MeasurementNoise, flow_sigma
+from riseg_drake.segmentation.twists import (
+    Twists,
+    patch_twists,
+    point_precision,
+    sliding_prior,
+    triplet_twists,
+)
 
 
 @dataclass
@@ -63,21 +69,25 @@ def group_body_frames(
         rng: draws the body frames.
     """
     noise, focal_length = parameters.noise, pair.current.intrinsics.fx
-    moving = moving_pixels(pair, expected_flow, optical_flow, above_0.mask, noise, parameters.moving)
+    moving = moving_pixels(pair, expected_flow, optical_flow, above_0, noise, parameters.moving)
     if not moving.any():
         return no_groups()
     region = bounding_region(moving, margin=16)
     sigma = np.full(moving.shape, np.inf, np.float32)
-    sigma[region] = flow_sigma(smooth_gray(pair.reference.color[region]), noise)
+    sigma[region] = flow_sigma(pair.reference.gray[region], noise)
     trusted = moving & (sigma <= noise.flow_max)
     frames = sample_body_frames(pair, optical_flow, trusted, sigma, parameters.frames, rng)
     if len(frames) < parameters.grouping.members_min:
         return no_groups()
     normal_C0 = pair.reference.X_WC[:3, :3].T @ above_0.plane_W[:3]
     prior = sliding_prior(normal_C0, parameters.motions.tilt, parameters.motions.lift)
-    twists = _calc_bfifs(frames, above_0.depth_noise, focal_length, prior, parameters)
-    frames, twists = _on_one_body(frames, twists, parameters.motions.misfit_max)
-    group, motions = _settled_groups(frames, twists, above_0.depth_noise, focal_length, prior, parameters)
+    precision = point_precision(
+        frames.p_C0Q0, frames.depth_1, frames.flow_sigma, above_0.depth_noise, focal_length
+    )
+    twists = _calc_bfifs(frames, precision, prior, parameters)
+    rigid = _on_one_body(twists, parameters.motions.misfit_max)
+    frames, twists, precision = frames.subset(rigid), twists.subset(rigid), precision[rigid]
+    group, motions = _settled_groups(frames, twists, precision, focal_length, prior, parameters)
     seeds = frames.p_C0Q0[:, 0]
     spans = [flow_difference(seeds[group == g], X, np.eye(4), focal_length) for g, X in enumerate(motions)]
     return BFIFGroups(
@@ -92,19 +102,18 @@ def group_body_frames(
     )
 
 
-def _on_one_body(frames: BodyFrames, twists: Twists, misfit_max: float) -> tuple[BodyFrames, Twists]:
-    """Without the frames that no rigid motion explains.
+def _on_one_body(twists: Twists, misfit_max: float) -> NDArray[np.bool_]:
+    """Which body frames [K] a rigid motion explains.
 
-    They lie across two bodies, are as near to the one's twist as to the other's, and would be a bridge.
+    The others lie across two bodies, are as near to the one's twist as to the other's, and would be a bridge.
     """
-    rigid = twists.misfit <= misfit_max * max(1.0, float(np.median(twists.misfit)))
-    return frames.subset(rigid), twists.subset(rigid)
+    return twists.misfit <= misfit_max * max(1.0, float(np.median(twists.misfit)))
 
 
 def _settled_groups(
     frames: BodyFrames,
     twists: Twists,
-    depth_noise: float,
+    precision: NDArray[np.float64],
     focal_length: float,
     prior: NDArray[np.float64],
     parameters: BFIFParameters,
@@ -115,19 +124,27 @@ def _settled_groups(
     again among themselves, and motions that cannot be told apart are joined.
     """
 
-    def fit(group: NDArray[np.intp]) -> NDArray[np.float64]:
-        return group_motions(frames, group, depth_noise, focal_length, prior)
-
     group = group_twists(twists, parameters.grouping)
+    motions = group_motions(frames, group, precision, prior)
+
+    def regroup(following: NDArray[np.intp]) -> bool:
+        """Take these groups instead, and their motions; False if they are the same."""
+        nonlocal group, motions
+        if np.array_equal(following, group):
+            return False
+        group, motions = following, group_motions(frames, following, precision, prior)
+        return True
+
     for _ in range(parameters.settling_rounds):
-        misfit = misfits(frames, fit(group), depth_noise, focal_length)
-        group = settle_groups(frames, misfit, twists.misfit, parameters.motions)
-        left = group < 0
+        misfit = misfits(frames, motions, precision)
+        settled = settle_groups(frames, misfit, twists.misfit, parameters.motions)
+        left = settled < 0
         again = group_twists(twists.subset(left), parameters.grouping)
-        group[left] = np.where(again >= 0, again + misfit.shape[1], -1)
-        group = renumbered(group, parameters.grouping.members_min)
-    group = merge_equal_motions(frames, group, fit(group), focal_length, parameters.motions)
-    return group, fit(group)
+        settled[left] = np.where(again >= 0, again + misfit.shape[1], -1)
+        if not regroup(renumbered(settled, parameters.grouping.members_min)):
+            break
+    regroup(merge_equal_motions(frames, group, motions, focal_length, parameters.motions))
+    return group, motions
 
 
 def no_groups() -> BFIFGroups:
@@ -146,8 +163,7 @@ def no_groups() -> BFIFGroups:
 
 def _calc_bfifs(
     frames: BodyFrames,
-    depth_noise: float,
-    focal_length: float,
+    precision: NDArray[np.float64],
     prior: NDArray[np.float64],
     parameters: BFIFParameters,
 ) -> Twists:
@@ -158,4 +174,4 @@ def _calc_bfifs(
     p_C0S = frames.p_C0Q0[:, 0].mean(0) if at_points else np.zeros(3)
     if parameters.frames.kind == "triplets":
         return triplet_twists(frames, p_C0S)
-    return patch_twists(frames, p_C0S, depth_noise, focal_length, prior)
+    return patch_twists(frames, p_C0S, precision, prior)

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import Region, bounding_region, pixel_grid
 from riseg_drake.geometry.rgbd import FramePair
-from riseg_drake.segmentation.noise import MeasurementNoise, gray_variance, smooth_gray
+from riseg_drake.segmentation.above_table import AboveTable
+from riseg_drake.segmentation.noise import MeasurementNoise, gray_variance
 
 _COST_MAX = np.float32(25)
 """Squared normalised residuals count no more than that."""
@@ -42,23 +43,22 @@ def moving_pixels(
     pair: FramePair,
     expected_flow: NDArray[np.float32],
     optical_flow: NDArray[np.float32],
-    above_0: NDArray[np.bool_],
+    above_0: AboveTable,
     noise: MeasurementNoise,
     parameters: MovingParameters,
 ) -> NDArray[np.bool_]:
     """||X_t|| >> 0 [H, W]: what moves of its own, in the view of t-1."""
-    moving = np.zeros_like(above_0)
-    if not above_0.any():
+    moving = np.zeros_like(above_0.mask)
+    if not above_0.mask.any():
         return moving
-    depth = pair.reference.depth[above_0]
-    pixels_per_metre = pair.current.intrinsics.fx / max(float(np.median(depth)), 1e-3)
+    pixels_per_metre = above_0.pixels_per_metre(pair.reference.intrinsics)
     pixels_min = parameters.area_min * pixels_per_metre**2
     window = 2 * max(1, round(0.5 * parameters.window * pixels_per_metre)) + 1
 
-    region = bounding_region(above_0, margin=window)
+    region = bounding_region(above_0.mask, margin=window)
     X_t = effective_flow(optical_flow[region], expected_flow[region])
     with np.errstate(invalid="ignore"):
-        candidate = above_0[region] & (X_t[..., 0] ** 2 + X_t[..., 1] ** 2 > parameters.flow_min**2)
+        candidate = above_0.mask[region] & (X_t[..., 0] ** 2 + X_t[..., 1] ** 2 > parameters.flow_min**2)
     if np.count_nonzero(candidate) < pixels_min:
         return moving
     evidence = zero_motion_evidence(pair, expected_flow, optical_flow, region, noise, window)
@@ -81,15 +81,17 @@ def zero_motion_evidence(
     The difference of the squared gray residuals over their variance, [h, w] of a region: about 0 where
     nothing moves, or where there is no texture to tell.
     """
-    I_0, I_1 = smooth_gray(pair.reference.color[region]), smooth_gray(pair.current.color)
-    variance = gray_variance(I_0, noise)
+    I_0, I_1 = pair.reference.gray[region], pair.current.unhidden_gray
+    per_variance = 1 / gray_variance(I_0, noise)
     uv = pixel_grid(*pair.current.intrinsics.shape)[region]
-    robot_1 = pair.current.robot.astype(np.uint8)
-    worse, hidden = np.zeros_like(I_0), np.zeros(I_0.shape, bool)
-    for sign, flow in ((1.0, np.nan_to_num(expected_flow[region])), (-1.0, optical_flow[region])):
-        warped = cv2.remap(I_1, uv + flow, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        worse += np.float32(sign) * np.minimum((warped - I_0) ** 2 / variance, _COST_MAX)
-        hidden |= cv2.remap(robot_1, uv + flow, None, cv2.INTER_NEAREST) > 0
+    costs = []
+    for flow in (expected_flow[region], optical_flow[region]):
+        residual = cv2.remap(I_1, uv + flow, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        residual -= I_0
+        residual *= residual
+        residual *= per_variance
+        costs.append(np.minimum(residual, _COST_MAX))
+    worse = costs[0] - costs[1]
     # Behind the robot nothing can be compared, and flow invents something that fits.
-    worse[hidden] = 0
+    worse[np.isnan(worse) | np.isnan(expected_flow[region][..., 0])] = 0
     return cv2.boxFilter(worse, -1, (window, window))

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import back_project
-from riseg_drake.geometry.rgbd import Frame, FramePair, unhidden_depth
+from riseg_drake.geometry.camera import rays
+from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.geometry.se3 import inverse, move_points
 from riseg_drake.segmentation.association import UNKNOWN
 from riseg_drake.segmentation.propagation import pixels_of
@@ -66,9 +66,10 @@ def remember(
     reference, current = pair.reference, pair.current
     coarse = (slice(None, None, _EVERY), slice(None, None, _EVERY))
     label = label_0[coarse]
-    p_C0Q = back_project(reference.depth, reference.intrinsics)[coarse]
-    visible = (label > 0) & (label != UNKNOWN) & (reference.depth[coarse] > 0)
-    p_WQ = move_points(reference.X_WC, p_C0Q[visible].astype(float))
+    depth = reference.depth[coarse]
+    visible = (label > 0) & (label != UNKNOWN) & (depth > 0)
+    p_C0Q = rays(reference.intrinsics)[coarse][visible].astype(float) * depth[visible, None]
+    p_WQ = move_points(reference.X_WC, p_C0Q)
     owner = label[visible]
     ids = np.union1d(np.unique(owner), list(memory)).astype(int)
     everything = {int(a): np.concatenate([memory.get(int(a), np.empty((0, 3))), p_WQ[owner == a]]) for a in ids}
@@ -90,6 +91,6 @@ def _out_of_sight(p_WQ: NDArray, frame: Frame) -> NDArray[np.bool_]:
     vu, inside = pixels_of(p_CQ, frame.intrinsics)
     hidden = ~inside
     v, u = vu[inside].T
-    depth = unhidden_depth(frame)[v, u]
+    depth = frame.unhidden_depth[v, u]
     hidden[inside] = (depth == 0) | (depth < p_CQ[inside, 2] - _DEPTH_AGREES)
     return hidden

@@ -12,21 +12,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import Region, bounding_region, rays
-from riseg_drake.geometry.rgbd import Frame, FramePair, unhidden_depth
+from riseg_drake.geometry.camera import Region, bounding_region
+from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
 from riseg_drake.segmentation.above_table import AboveTable
-from riseg_drake.segmentation.expected_flow import where_to
-from riseg_drake.segmentation.noise import (
-    MeasurementNoise,
-    depth_sigma,
-    gray_variance,
-    smooth_gray,
-)
-from riseg_drake.segmentation.potts import potts_labels
+from riseg_drake.segmentation.noise import MeasurementNoise, depth_sigma, gray_variance
+from riseg_drake.segmentation.potts import PottsGraph, potts_labels
 from riseg_drake.segmentation.superpixels import Superpixels, superpixels
-
-_ROW = 256
-"""Pixels are handed to OpenCV in rows of so many: it wants images, and none longer than 32767."""
+from riseg_drake.segmentation.surface import SurfacePixels, seek, surface_pixels
 
 _NO_EVIDENCE = np.float32(2)
 """The cost that is expected of a match."""
@@ -52,22 +44,61 @@ class MotionLabelParameters:
     """A motion must explain the pixels it wins so much better, on average, than any single other one."""
 
 
+@dataclass(frozen=True)
+class ReferencePieces(Immutable):
+    """The reference frame cut into pieces, with all that is asked of it for each new frame."""
+
+    region: Region
+    """The part of the view that is cut: all that stands there."""
+    pieces: Superpixels
+    """Of the region."""
+    area: NDArray[np.intp]
+    """[number of pieces], pixels of each."""
+    graph: PottsGraph
+    """Which pieces are neighbours, and what different labels on both sides cost."""
+    witnesses: SurfacePixels
+    """The pixels that can tell motions apart: with depth, and not on the rim."""
+    piece: NDArray[np.intp]
+    """[N], of each witness."""
+    gray: NDArray[np.float32]
+    """[N], gray value of each witness."""
+    variance: NDArray[np.float32]
+    """[N], of the difference between that and where it should reappear."""
+
+
 def cut_pieces(
-    reference: Frame, above_0: AboveTable, parameters: MotionLabelParameters
-) -> tuple[Region, Superpixels]:
+    reference: Frame, above_0: AboveTable, noise: MeasurementNoise, parameters: MotionLabelParameters
+) -> ReferencePieces:
     """The pieces of the reference frame that decide as one, in the region of all that stands there."""
     region = bounding_region(above_0.mask)
-    z = float(np.median(reference.depth[above_0.mask]))
-    size = max(3, round(parameters.piece * reference.intrinsics.fx / max(z, 1e-3)))
-    return region, superpixels(reference.color[region], above_0.height[region], above_0.mask[region], size)
+    size = max(3, round(parameters.piece * above_0.pixels_per_metre(reference.intrinsics)))
+    pieces = superpixels(reference.color[region], above_0.height[region], above_0.mask[region], size)
+    whole = np.full(above_0.mask.shape, -1, np.intp)
+    whole[region] = pieces.label
+    # On the rim a pixel sees half of what is behind it: no motion explains that, least of all the right one.
+    core = cv2.erode((whole >= 0).astype(np.uint8), _RIM, borderValue=0) > 0
+    witnesses = surface_pixels(core, reference.depth, reference.intrinsics)
+    v, u = witnesses.pixel
+    return ReferencePieces(
+        region=region,
+        pieces=pieces,
+        area=np.bincount(pieces.label[pieces.label >= 0], minlength=pieces.count),
+        graph=PottsGraph(
+            pieces.count,
+            pieces.borders,
+            parameters.border * pieces.length * np.exp(-pieces.contrast / parameters.contrast),
+        ),
+        witnesses=witnesses,
+        piece=whole[v, u],
+        gray=reference.gray[v, u],
+        variance=gray_variance(reference.gray, noise)[v, u],
+    )
 
 
 def label_by_motion(
     pair: FramePair,
-    region: Region,
-    pieces: Superpixels,
+    pieces: ReferencePieces,
     motions: NDArray[np.float64],
-    noise: MeasurementNoise,
     depth_noise: float,
     parameters: MotionLabelParameters,
 ) -> NDArray[np.int16]:
@@ -75,57 +106,44 @@ def label_by_motion(
 
     Args:
         pair: the frames of t-1 and t.
-        region: the part of the view of t-1 that `pieces` are of.
         pieces: of the frame of t-1.
         motions: [G, 4, 4] in C0.
-        noise: of the images.
         depth_noise: standard deviation of depth at 1 m, m.
         parameters: see there.
 
     Returns:
         [H, W], 1 + number of the motion; 0 for what stands still and for the table.
     """
+    count = pieces.pieces.count
+    cost = motion_costs(pair, pieces, motions, depth_noise, parameters.cost_max)
+    unary = np.stack([np.bincount(pieces.piece, c, count) for c in cost]) / parameters.correlated_pixels
+    label = _fewest_labels(unary, pieces, parameters)
     out = np.zeros(pair.reference.depth.shape, np.int16)
-    inside = np.nonzero(pieces.label >= 0)
-    of_pixel = pieces.label[inside]
-    pixel = (inside[0] + region[0].start, inside[1] + region[1].start)
-    cost = motion_costs(pair, pixel, motions, noise, depth_noise, parameters)
-    # On the rim a pixel sees half of what is behind it: no motion explains that, least of all the right one.
-    core = cv2.erode((pieces.label >= 0).astype(np.uint8), _RIM, borderValue=0)[inside] > 0
-    cost[:, ~core] = _NO_EVIDENCE
-    sums = [np.bincount(of_pixel, c, pieces.count) for c in cost]
-    unary = np.stack(sums, axis=1) / parameters.correlated_pixels
-    pixels = np.bincount(of_pixel, minlength=pieces.count)
-    weight = parameters.border * pieces.length * np.exp(-pieces.contrast / parameters.contrast)
-    label = _fewest_labels(unary, pixels, pieces, weight, parameters)
-    out[pixel] = label[of_pixel]
+    # The last entry is for what is in no piece, whose number is -1.
+    out[pieces.region] = np.append(label, 0)[pieces.pieces.label]
     return out
 
 
 def _fewest_labels(
-    unary: NDArray[np.float64],
-    pixels: NDArray[np.intp],
-    pieces: Superpixels,
-    weight: NDArray[np.float64],
-    parameters: MotionLabelParameters,
+    unary: NDArray[np.float64], pieces: ReferencePieces, parameters: MotionLabelParameters
 ) -> NDArray[np.intp]:
-    """Label the pieces, and drop, one after the other, the motions that are not needed.
+    """Label the pieces by their costs [1 + G, pieces], and drop, one by one, the motions not needed.
 
     A motion is not needed where another single one explains what it has won almost as well: a blank
     surface fits many motions and must not be shared out among them. Standing still is always there.
     """
-    needed = list(range(unary.shape[1]))
+    needed = list(range(len(unary)))
     while True:
-        label = potts_labels(unary[:, needed], pieces.borders, weight)
+        label = potts_labels(unary[needed], pieces.graph)
         gains = []
         for k in range(1, len(needed)):
             mine = label == k
             if not mine.any():
                 gains.append(0.0)
                 continue
-            sums = unary[mine][:, needed].sum(0)
+            sums = unary[needed][:, mine].sum(1)
             gain = np.delete(sums, k).min() - sums[k]
-            gains.append(gain * parameters.correlated_pixels / pixels[mine].sum())
+            gains.append(gain * parameters.correlated_pixels / pieces.area[mine].sum())
         if not gains or min(gains) >= parameters.gain_min:
             return np.array(needed)[label]
         del needed[int(np.argmin(gains)) + 1]
@@ -133,37 +151,27 @@ def _fewest_labels(
 
 def motion_costs(
     pair: FramePair,
-    pixel: tuple[NDArray[np.intp], NDArray[np.intp]],
+    pieces: ReferencePieces,
     motions: NDArray[np.float64],
-    noise: MeasurementNoise,
     depth_noise: float,
-    parameters: MotionLabelParameters,
+    cost_max: float,
 ) -> NDArray[np.float32]:
-    """How badly standing still and each motion [G, 4, 4] explain N pixels (v, u) of t-1, [1 + G, N].
+    """How badly standing still and each motion [G, 4, 4] explain the N witnesses of t-1, [1 + G, N].
 
     Squared residuals of gray value and of depth, normalised by their noise: 1 + 1 where a motion is
     right, up to `cost_max` each where it is wrong.
     """
-    reference, current = pair.reference, pair.current
-    intrinsics = current.intrinsics
-    count = len(pixel[0])
-    rows = tuple(np.resize(index, (-(-count // _ROW), _ROW)) for index in pixel)
-    gray_0, gray_1 = smooth_gray(reference.color), smooth_gray(current.color)
-    I_0, variance = gray_0[rows], gray_variance(gray_0, noise)[rows]
-    depth, ray = reference.depth[rows], rays(intrinsics)[rows]
-    depth_1, robot_1 = unhidden_depth(current), current.robot.astype(np.uint8)
-    cost_max = np.float32(parameters.cost_max)
-    cost = np.empty((1 + len(motions), count), np.float32)
+    gray_1, depth_1 = pair.current.unhidden_gray, pair.current.unhidden_depth
+    per_variance = 1 / pieces.variance
+    ceiling = np.float32(cost_max)
+    cost = np.empty((1 + len(motions), len(pieces.witnesses)), np.float32)
     for k, motion in enumerate((np.eye(4), *motions)):
-        target, z_expected = where_to(ray, depth, pair.X_C1C0 @ motion, intrinsics)
-        I_1 = cv2.remap(gray_1, target, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        z_1 = cv2.remap(depth_1, target, None, cv2.INTER_NEAREST, borderValue=0)
-        hidden = cv2.remap(robot_1, target, None, cv2.INTER_NEAREST, borderValue=1) > 0
-        photometric = np.minimum((I_1 - I_0) ** 2 / variance, cost_max)
-        sigma = depth_sigma(z_expected, np.sqrt(2) * depth_noise)
-        geometric = np.minimum(((z_1 - z_expected) / sigma) ** 2, cost_max)
+        sought = seek(pieces.witnesses, pair.X_C1C0 @ motion)
+        z_1 = sought.read(depth_1)
+        photometric = np.minimum((sought.read_between(gray_1) - pieces.gray) ** 2 * per_variance, ceiling)
+        sigma = depth_sigma(sought.depth, np.float32(np.sqrt(2) * depth_noise))
+        geometric = np.minimum(((z_1 - sought.depth) / sigma) ** 2, ceiling)
         both = photometric + np.where(z_1 > 0, geometric, np.float32(1))
         # What cannot be compared speaks neither for nor against: the value expected of a match.
-        both[hidden | ~np.isfinite(both)] = _NO_EVIDENCE
-        cost[k] = both.ravel()[:count]
+        cost[k] = np.where(np.isnan(both), _NO_EVIDENCE, both)
     return cost

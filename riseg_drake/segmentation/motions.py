@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.rgbd import Immutable
 from riseg_drake.geometry.se3 import exp_se3, move_points, translation
 from riseg_drake.segmentation.body_frames import BodyFrames
-from riseg_drake.segmentation.twists import fit_motion, point_precision
+from riseg_drake.segmentation.twists import fit_motion
 
 _AHEAD = np.array([[0.0, 0.0, 0.4], [0.05, 0.0, 0.4], [0.0, 0.05, 0.4]])
 """Points to compare motions by, m, where there are no others."""
@@ -65,42 +65,41 @@ class BFIFGroups(Immutable):
 def group_motions(
     frames: BodyFrames,
     group: NDArray[np.intp],
-    depth_noise: float,
-    focal_length: float,
+    precision: NDArray[np.float64],
     prior: NDArray | None = None,
 ) -> NDArray[np.float64]:
-    """The rigid motion [G, 4, 4] in C0 that fits all points of each group's frames best."""
+    """The rigid motion [G, 4, 4] in C0 that fits all points of each group's frames best.
+
+    Args:
+        frames: K body frames of M points.
+        group: [K], 0..G-1 or -1.
+        precision: [K, M, 3, 3], of the points' displacements, see `point_precision`.
+        prior: [6, 6], see `fit_motion`.
+    """
     G = int(group.max(initial=-1)) + 1
     if G == 0:
         return np.empty((0, 4, 4))
     q_0, q_1 = np.zeros((2, G, _POINTS_MAX, 3))
-    z_1, sigma, used = np.ones((3, G, _POINTS_MAX))
+    W = np.zeros((G, _POINTS_MAX, 3, 3))
+    used = np.zeros((G, _POINTS_MAX), bool)
     for g in range(G):
         mine = np.argwhere(frames.used & (group == g)[:, None])
         k, m = mine[:: -(-len(mine) // _POINTS_MAX)].T
         n = len(k)
         q_0[g, :n], q_1[g, :n] = frames.p_C0Q0[k, m], frames.p_C0Q1[k, m]
-        z_1[g, :n], sigma[g, :n] = frames.depth_1[k, m], frames.flow_sigma[k, m]
-        used[g, n:] = 0
-    W = point_precision(q_0, z_1, sigma, depth_noise, focal_length)
+        W[g, :n], used[g, :n] = precision[k, m], True
     centre = q_0.sum(1) / used.sum(1)[:, None]
-    V_B, _, _ = fit_motion(q_0 - centre[:, None], q_1 - centre[:, None], W, used > 0, prior)
+    V_B, _, _ = fit_motion(q_0 - centre[:, None], q_1 - centre[:, None], W, used, prior)
     return translation(centre) @ exp_se3(V_B) @ translation(-centre)
 
 
-def misfits(
-    frames: BodyFrames,
-    motions: NDArray,
-    depth_noise: float,
-    focal_length: float,
-) -> NDArray[np.float64]:
-    """Mean squared normalised residual [K, G] of each body frame's points under each motion."""
-    W = point_precision(frames.p_C0Q0, frames.depth_1, frames.flow_sigma, depth_noise, focal_length)
+def misfits(frames: BodyFrames, motions: NDArray, precision: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean squared normalised residual [K, G] of each body frame's points under each motion [G, 4, 4]."""
     count = 3.0 * frames.used.sum(1)
     columns = []
     for X in motions:
-        residual = frames.p_C0Q1 - move_points(X, frames.p_C0Q0)
-        squared = np.einsum("kmi,kmij,kmj->km", residual, W, residual)
+        residual = (frames.p_C0Q1 - move_points(X, frames.p_C0Q0))[..., None]
+        squared = (residual * (precision @ residual)).sum((-2, -1))
         columns.append((squared * frames.used).sum(1) / count)
     return np.stack(columns, axis=1) if columns else np.empty((len(frames), 0))
 

@@ -31,12 +31,6 @@ def depth_sigma(depth: NDArray, noise_at_1m: float) -> NDArray:
     return noise_at_1m * depth**2
 
 
-def smooth_gray(color: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Gray values [H, W], 0..255, smoothed just enough to be interpolated between pixels."""
-    gray = cv2.cvtColor(color, cv2.COLOR_RGB2GRAY)
-    return cv2.GaussianBlur(gray, (0, 0), 0.7).astype(np.float32)
-
-
 def gray_variance(gray: NDArray[np.float32], noise: MeasurementNoise) -> NDArray[np.float32]:
     """Variance [H, W] of the difference between a gray value and where it should reappear.
 

@@ -11,11 +11,21 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.geometry.camera import bounding_region
+from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.segmentation.above_table import AboveTable
+from riseg_drake.segmentation.expected_flow import pixel_projection
+
 DIS_PRESETS = {
     "ultrafast": cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST,
     "fast": cv2.DISOPTICAL_FLOW_PRESET_FAST,
     "medium": cv2.DISOPTICAL_FLOW_PRESET_MEDIUM,
 }
+
+
+_MARGIN = 0.04
+"""Share of the image's width by which flow is worked out around what stands on the table: objects' own
+motion from one frame of a pair to the other, and what a window covers."""
 
 
 class FlowMethod(Protocol):
@@ -24,6 +34,40 @@ class FlowMethod(Protocol):
     def __call__(self, color_0: NDArray[np.uint8], color_1: NDArray[np.uint8]) -> NDArray[np.float32]:
         """Flow O_t [H, W, 2] in pixels from image 0 to image 1, both [H, W, 3] RGB."""
         ...
+
+
+def flow_around(above_0: AboveTable, pair: FramePair, method: FlowMethod) -> NDArray[np.float32]:
+    """O_t [H, W, 2], pixels, where it is needed: in and around what stands on the table, NaN elsewhere.
+
+    The method sees a part of each image: that of t lies where the camera's motion has moved that of
+    t-1, to the whole pixel.
+
+    Args:
+        above_0: what stands on the table, at t-1.
+        pair: the frames of t-1 and t.
+        method: any flow method.
+    """
+    height, width = above_0.mask.shape
+    flow = np.full((height, width, 2), np.nan, np.float32)
+    if not above_0.mask.any():
+        return flow
+    rows, columns = bounding_region(above_0.mask, margin=round(_MARGIN * width))
+    u, v = 0.5 * (columns.start + columns.stop), 0.5 * (rows.start + rows.stop)
+    M = pixel_projection(pair.X_C1C0, pair.reference.intrinsics)
+    a, b, c = M @ np.array([u, v, 1.0, 1 / above_0.distance])
+    du, dv = round(float(a / c - u)), round(float(b / c - v))
+    rows, shifted_rows = _seen_in_both(rows, dv, height)
+    columns, shifted_columns = _seen_in_both(columns, du, width)
+    if rows.start < rows.stop and columns.start < columns.stop:
+        images = pair.reference.color[rows, columns], pair.current.color[shifted_rows, shifted_columns]
+        np.add(method(*images), np.float32([du, dv]), out=flow[rows, columns])
+    return flow
+
+
+def _seen_in_both(span: slice, shift: int, size: int) -> tuple[slice, slice]:
+    """The part of some rows or columns that lies in an image of that size before and after a shift."""
+    start, stop = max(span.start, -shift), min(span.stop, size, size - shift)
+    return slice(start, stop), slice(start + shift, stop + shift)
 
 
 @dataclass

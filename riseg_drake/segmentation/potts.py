@@ -2,43 +2,52 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
 
 
-def potts_labels(
-    unary: NDArray[np.float64],
-    edges: NDArray[np.intp],
-    weight: NDArray[np.float64],
-    rounds: int = 30,
-) -> NDArray[np.intp]:
-    """Labels [N] that nearly minimise sum unary[i, x_i] + sum weight[e] [x_i != x_j].
+class PottsGraph:
+    """N nodes and the borders between them, in the order in which messages travel."""
+
+    def __init__(self, nodes: int, edges: NDArray[np.intp], weight: NDArray[np.float64]) -> None:
+        """Borders [M, 2] between pairs of nodes, and what different labels at their ends cost [M] (>= 0)."""
+        alone = np.setdiff1d(np.arange(nodes), edges)
+        both = np.concatenate([edges, edges[:, ::-1], np.stack([alone, alone], axis=1)])
+        M = len(edges)
+        twin = np.concatenate([np.arange(M, 2 * M), np.arange(M), np.arange(2 * M, len(both))])
+        # Sorted by target, so that what arrives at a node is summed over neighbouring places.
+        order = np.argsort(both[:, 1], kind="stable")
+        place = np.empty(len(order), np.intp)
+        place[order] = np.arange(len(order))
+        self.source = both[order, 0]
+        self.twin = place[twin[order]]
+        """The message that travels the other way."""
+        self.weight = np.concatenate([weight, weight, np.zeros(len(alone))])[order].astype(np.float32)
+        self.first = np.searchsorted(both[order, 1], np.arange(nodes))
+        """Where the messages to each node begin; a node without borders has one from itself, worth 0."""
+
+
+def potts_labels(unary: NDArray[np.float64], graph: PottsGraph, rounds: int = 30) -> NDArray[np.intp]:
+    """Labels x [N] that nearly minimise sum unary[x_i, i] + sum weight[e] [x_i != x_j].
 
     Min-sum belief propagation: exact on trees, close on the planar graphs of image pieces.
 
     Args:
-        unary: [N, L], cost of each label at each node.
-        edges: [M, 2], pairs of nodes.
-        weight: [M], cost of different labels at the two ends, >= 0.
+        unary: [L, N], cost of each label at each node.
+        graph: the nodes and what their borders cost.
         rounds: of message passing.
     """
-    N, M = len(unary), len(edges)
-    if M == 0:
-        return unary.argmin(1)
-    source = np.concatenate([edges[:, 0], edges[:, 1]])
-    target = np.concatenate([edges[:, 1], edges[:, 0]])
-    back = np.concatenate([np.arange(M, 2 * M), np.arange(M)])
-    cap = np.concatenate([weight, weight])[:, None].astype(np.float32)
     unary = unary.astype(np.float32)
-    gather = csr_matrix((np.ones(2 * M, np.float32), (target, np.arange(2 * M))), shape=(N, 2 * M))
-    message = np.zeros((2 * M, unary.shape[1]), np.float32)
+    message = np.zeros((len(unary), len(graph.source)), np.float32)
     belief = unary
     for _ in range(rounds):
-        outgoing = belief[source] - message[back]
-        outgoing -= outgoing.min(axis=1, keepdims=True)
-        following = 0.5 * (message + np.minimum(outgoing, cap))
-        settled = np.abs(following - message).max() < 1e-2
-        message = following
-        belief = unary + gather @ message
-        if settled:
+        outgoing = belief.take(graph.source, axis=1)
+        outgoing -= message.take(graph.twin, axis=1)
+        outgoing -= outgoing.min(axis=0)
+        np.minimum(outgoing, graph.weight, out=outgoing)
+        # Half a step: messages that all change at once may swing for ever.
+        outgoing -= message
+        outgoing *= np.float32(0.5)
+        message += outgoing
+        belief = unary + np.add.reduceat(message, graph.first, axis=1)
+        if max(outgoing.max(), -outgoing.min()) < 1e-2:
             break
-    return belief.argmin(1)
+    return belief.argmin(0)

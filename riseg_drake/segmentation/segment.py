@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import Region, back_project, bounding_region, pixel_grid
+from riseg_drake.geometry.camera import back_project, bounding_region, pixel_grid
 from riseg_drake.geometry.rgbd import FramePair, Immutable
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.association import (
@@ -18,7 +18,12 @@ from riseg_drake.segmentation.doubt import DoubtParameters, doubtful_ids
 from riseg_drake.segmentation.effective_flow import effective_flow
 from riseg_drake.segmentation.growth import GrowthParameters, grow_by_similar_flow
 from riseg_drake.segmentation.memory import Memory, draw_memory, moved_memory, remember
-from riseg_drake.segmentation.motion_labels import MotionLabelParameters, cut_pieces, label_by_motion
+from riseg_drake.segmentation.motion_labels import (
+    MotionLabelParameters,
+    ReferencePieces,
+    cut_pieces,
+    label_by_motion,
+)
 from riseg_drake.segmentation.motions import (
     BFIFGroups,
     MotionParameters,
@@ -27,7 +32,6 @@ from riseg_drake.segmentation.motions import (
 )
 from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.propagation import carry_labels
-from riseg_drake.segmentation.superpixels import Superpixels
 
 
 @dataclass
@@ -66,7 +70,7 @@ class Segmentation(Immutable):
     """Number of the reference frame that the next fields belong to."""
     known: KnownObjects
     """What was known at the reference frame, before the motion since then."""
-    pieces: tuple[Region, Superpixels] | None
+    pieces: ReferencePieces | None
     """The reference frame cut into pieces, once something has moved in it."""
     decided: NDArray[np.uint16]
     """[H, W], labels at the reference frame in the light of the motion since then."""
@@ -74,8 +78,8 @@ class Segmentation(Immutable):
     """Motion [4, 4] in C0 since the reference frame, of the ids that moved."""
     memory: Memory
     """Points of objects that the reference frame does not see, as of its time."""
-    hidden: Memory
-    """Points of objects that the frame `sequence` does not see, as of its time."""
+    pair: FramePair | None
+    """The last pair, whose current frame `label` belongs to; None before the first."""
     born: dict[int, int]
     doubtful: frozenset[int]
     """Ids that may be two objects, see doubt.py."""
@@ -114,7 +118,7 @@ def nothing_segmented(shape: tuple[int, int]) -> Segmentation:
         decided=empty,
         motion_of={},
         memory={},
-        hidden={},
+        pair=None,
         born={},
         doubtful=frozenset(),
         next_id=1,
@@ -147,7 +151,7 @@ def segment(
     """
     if before.sequence == pair.current.sequence:
         return before
-    now = _renew_reference(before, pair, above_0)
+    now = _renew_reference(before, pair, above_0, parameters)
     if len(groups):
         starts = pair.current.time - before.last_motion > parameters.episode_gap
         now = replace(now, last_motion=pair.current.time, episode=now.episode + int(starts))
@@ -156,7 +160,8 @@ def segment(
     )
     if len(motions) and above_0.mask.any():
         if parameters.outline == "motion" and now.pieces is None:
-            now = replace(now, pieces=cut_pieces(pair.reference, above_0, parameters.labels))
+            pieces = cut_pieces(pair.reference, above_0, parameters.noise, parameters.labels)
+            now = replace(now, pieces=pieces)
         moving = _grow(now, pair, expected_flow, optical_flow, groups, motions, above_0, parameters)
         now = _decide(now, pair, groups, motions, moving, above_0, parameters)
     if parameters.propagation == "flow":
@@ -166,11 +171,10 @@ def segment(
     elif parameters.propagation == "reference":
         remembered = moved_memory(now.memory, now.motion_of, pair.reference.X_WC)
         drawn = draw_memory(remembered, pair.current)
-        label = carry_labels(pair, now.decided, now.motion_of, above_1.mask, drawn)
+        label = carry_labels(pair, now.decided, now.motion_of, above_1, drawn)
     else:
         raise ValueError(f"no propagation {parameters.propagation!r}: choose reference or flow")
-    hidden = remember(now.memory, pair, now.decided, now.motion_of) if parameters.memory else {}
-    return replace(now, sequence=pair.current.sequence, label=label, hidden=hidden)
+    return replace(now, sequence=pair.current.sequence, label=label, pair=pair)
 
 
 def push_by_flow(label: NDArray[np.uint16], optical_flow: NDArray[np.float32]) -> NDArray[np.uint16]:
@@ -183,7 +187,9 @@ def push_by_flow(label: NDArray[np.uint16], optical_flow: NDArray[np.float32]) -
     return out
 
 
-def _renew_reference(before: Segmentation, pair: FramePair, above_0: AboveTable) -> Segmentation:
+def _renew_reference(
+    before: Segmentation, pair: FramePair, above_0: AboveTable, parameters: SegmentParameters
+) -> Segmentation:
     """What is known at this pair's reference frame."""
     if pair.reference.sequence == before.reference_sequence:
         return before
@@ -191,6 +197,9 @@ def _renew_reference(before: Segmentation, pair: FramePair, above_0: AboveTable)
     label = before.label
     if before.sequence != pair.reference.sequence or label.shape != above_0.mask.shape:
         label = np.where(above_0.mask, UNKNOWN, np.uint16(0))
+    memory: Memory = {}
+    if parameters.memory and before.pair is not None:
+        memory = remember(before.memory, before.pair, before.decided, before.motion_of)
     return replace(
         before,
         reference_sequence=pair.reference.sequence,
@@ -198,7 +207,7 @@ def _renew_reference(before: Segmentation, pair: FramePair, above_0: AboveTable)
         pieces=None,
         decided=label,
         motion_of={},
-        memory=before.hidden,
+        memory=memory,
     )
 
 
@@ -214,9 +223,7 @@ def _grow(
 ) -> NDArray[np.int16]:
     """Line 7's growth from seeds to pixels, in the view of t-1: 1 + motion, 0 = stands still."""
     if now.pieces is not None:
-        return label_by_motion(
-            pair, *now.pieces, motions, parameters.noise, above_0.depth_noise, parameters.labels
-        )
+        return label_by_motion(pair, now.pieces, motions, above_0.depth_noise, parameters.labels)
     if parameters.outline != "flow":
         raise ValueError(f"no outline {parameters.outline!r}: choose motion or flow")
     X_t = effective_flow(optical_flow, expected_flow)
@@ -245,8 +252,7 @@ def _decide(
             born={**now.born, **dict.fromkeys(ids, now.episode)},
             next_id=max([now.next_id - 1, *ids]) + 1,
         )
-    z = pair.reference.depth[above_0.mask]
-    pixels_per_metre = pair.current.intrinsics.fx / max(float(np.median(z)), 1e-3)
+    pixels_per_metre = above_0.pixels_per_metre(pair.reference.intrinsics)
     region = bounding_region(now.known.label > 0, margin=1)
     gaps = motion_gaps(_points(groups, pair, above_0), motions, pair.current.intrinsics.fx)
     association = associate(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.se3 import adjoint, exp_se3, inverse, log_se3, skew, translation
+from riseg_drake.geometry.se3 import adjoint, exp_se3, inverse, log_se3, translation
 from riseg_drake.segmentation.body_frames import BodyFrames
 from riseg_drake.segmentation.noise import depth_sigma
 
@@ -78,8 +78,7 @@ def triplet_twists(frames: BodyFrames, p_C0S: NDArray) -> Twists:
 def patch_twists(
     frames: BodyFrames,
     p_C0S: NDArray,
-    depth_noise: float,
-    focal_length: float,
+    precision: NDArray[np.float64],
     prior: NDArray | None = None,
 ) -> Twists:
     """BFIFs of patches by weighted least squares, each with its own covariance.
@@ -87,14 +86,12 @@ def patch_twists(
     Args:
         frames: K patches.
         p_C0S: [3], where the space frame lies.
-        depth_noise: standard deviation of depth at 1 m, m.
-        focal_length: pixels.
+        precision: [K, M, 3, 3], of the points' displacements, see `point_precision`.
         prior: [6, 6], what is known of a twist before (see `sliding_prior`); nothing if None.
     """
-    W = point_precision(frames.p_C0Q0, frames.depth_1, frames.flow_sigma, depth_noise, focal_length)
     centre = (frames.p_C0Q0 * frames.used[..., None]).sum(1) / frames.used.sum(1)[:, None]
     q_0, q_1 = (p - centre[:, None] for p in (frames.p_C0Q0, frames.p_C0Q1))
-    V_B, covariance, misfit = fit_motion(q_0, q_1, W, frames.used, prior)
+    V_B, covariance, misfit = fit_motion(q_0, q_1, precision, frames.used, prior)
     V_S, covariance = change_space_frame(V_B, covariance, centre - p_C0S)
     return Twists(V_S, covariance, p_C0S, misfit)
 
@@ -148,7 +145,9 @@ def fit_motion(
         mean squared normalised residual [K].
     """
     K = len(q_0)
-    X = np.broadcast_to(np.eye(4), (K, 4, 4))
+    X, V = np.broadcast_to(np.eye(4), (K, 4, 4)), np.zeros((K, 6))
+    J = np.zeros((*q_0.shape, 6))
+    J[..., 3:] = np.eye(3)
     for _ in range(_GAUSS_NEWTON_STEPS):
         moved = q_0 @ X[:, :3, :3].swapaxes(1, 2) + X[:, None, :3, 3]
         residual = (q_1 - moved)[..., None]
@@ -156,8 +155,7 @@ def fit_motion(
         squared = (residual * W_residual).sum((-2, -1))
         # Cauchy weights: a point on another body pulls less the less it fits.
         weight = used / (1.0 + squared / _OUTLIER)
-        # d(exp(V) q)/dV = [-[q], I]
-        J = np.concatenate([-skew(moved), np.broadcast_to(np.eye(3), (*moved.shape[:2], 3, 3))], axis=-1)
+        _fill_jacobian(J, moved)
         J_W = ((W * weight[..., None, None]) @ J).reshape(K, -1, 6).swapaxes(1, 2)
         normal = J_W @ J.reshape(K, -1, 6)
         rhs = (J_W @ residual.reshape(K, -1, 1))[..., 0]
@@ -165,9 +163,18 @@ def fit_motion(
         normal = normal + 1e-9 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(6)
         if prior is not None:
             normal = normal + prior
-            rhs = rhs - log_se3(X) @ prior
+            # The motion is small: its twist is, nearly, the sum of the steps.
+            rhs = rhs - V @ prior
         step = np.linalg.solve(normal, rhs[..., None])[..., 0]
-        X = exp_se3(step) @ X
+        X, V = exp_se3(step) @ X, V + step
     misfit = (squared * weight).sum(1) / np.maximum(3.0 * weight.sum(1), 1e-9)
     covariance = np.linalg.inv(normal) * np.maximum(1.0, misfit)[:, None, None]
     return log_se3(X), covariance, misfit
+
+
+def _fill_jacobian(J: NDArray, q: NDArray) -> None:
+    """Set the first half of d(exp(V) q)/dV = [-[q], I], [..., 3, 6], for points q [..., 3]."""
+    x, y, z = np.moveaxis(q, -1, 0)
+    J[..., 0, 1], J[..., 0, 2] = z, -y
+    J[..., 1, 0], J[..., 1, 2] = -z, x
+    J[..., 2, 0], J[..., 2, 1] = y, -x

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-import numpy as np
+import cv2
 from numpy.typing import NDArray
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, LeafSystem
@@ -62,7 +62,7 @@ class FrameView(LeafSystem):
                 sequence=0,
                 time=float(self._time.Eval(context)[0]),
                 intrinsics=self._intrinsics,
-                color=np.ascontiguousarray(color.data[..., :3]),
+                color=cv2.cvtColor(color.data, cv2.COLOR_RGBA2RGB),
                 depth=sanitize_depth(depth.data[..., 0]),
                 X_WC=self._X_WC(q),
                 robot=self._robot_mask(q),

@@ -4,22 +4,28 @@ from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, LeafSystem
 
 from riseg_drake.geometry.rgbd import FramePair
-from riseg_drake.segmentation.optical_flow import DisFlow, FlowMethod
+from riseg_drake.segmentation.optical_flow import DisFlow, FlowMethod, flow_around
 from riseg_drake.systems.stage_clock import timed
 
 
 class OpticalFlow(LeafSystem):
     """O_t by any method that follows the `FlowMethod` protocol; DIS by default.
 
-    Input port: pair (FramePair).
-    Output port: optical_flow ([H, W, 2] float32, pixels).
+    Input ports:
+        pair (FramePair), above_table (AboveTable at t-1; may be left unconnected).
+    Output port:
+        optical_flow ([H, W, 2] float32, pixels; of the whole image, or if `above_table` is connected,
+        in and around what stands on the table, NaN elsewhere).
     """
 
     def __init__(self, method: FlowMethod | None = None) -> None:
         super().__init__()
         self.set_name("OpticalFlow")
         self._method = method or DisFlow()
-        self._pair = self.DeclareAbstractInputPort("pair", AbstractValue.Make(object()))
+        self._pair, self._above = (
+            self.DeclareAbstractInputPort(name, AbstractValue.Make(object()))
+            for name in ("pair", "above_table")
+        )
         self.DeclareAbstractOutputPort(
             "optical_flow",
             lambda: AbstractValue.Make(object()),
@@ -30,4 +36,7 @@ class OpticalFlow(LeafSystem):
     @timed
     def _calc_optical_flow(self, context: Context, output: AbstractValue) -> None:
         pair: FramePair = self._pair.Eval(context)
-        output.set_value(self._method(pair.reference.color, pair.current.color))
+        if self._above.HasValue(context):
+            output.set_value(flow_around(self._above.Eval(context), pair, self._method))
+        else:
+            output.set_value(self._method(pair.reference.color, pair.current.color))

@@ -9,6 +9,7 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from riseg_drake.geometry.camera import WHOLE, Intrinsics, Region, project, rays
 from riseg_drake.geometry.rgbd import Frame, FramePair
+from riseg_drake.segmentation.above_table import AboveTable
 
 CAMERA = Intrinsics(320, 240, 308.1, 307.9, 158.2, 119.4)
 
@@ -144,6 +145,14 @@ class DrawnScene:
         """Two frames as a pair, and the true labels of both."""
         (frame_0, label_0), (frame_1, label_1) = (self.frame(n, X_WCs[n], X_WBs[n], rng) for n in (0, 1))
         return FramePair(frame_0, frame_1), label_0, label_1
+
+
+def standing(frame: Frame, mask: NDArray[np.bool_]) -> AboveTable:
+    """The mask of what stands on the table in a frame, as if it had been measured."""
+    z = frame.depth[mask & (frame.depth > 0)]
+    height = np.where(mask, np.float32(0.03), np.float32(0))
+    distance = float(np.median(z)) if len(z) else 1.0
+    return AboveTable(mask, height, np.array([0.0, 0.0, 1.0, 0.0]), 0.002, distance)
 
 
 def motion_seen_from(X_WC0: NDArray, X_WB0: NDArray, X_WB1: NDArray) -> NDArray:

@@ -18,6 +18,7 @@ from tests.segmentation.drawn_scene import (
     looking_down,
     motion_seen_from,
     planar,
+    standing,
 )
 
 SIZES = [(0.07, 0.06, 0.03), (0.06, 0.08, 0.05)]
@@ -31,7 +32,9 @@ def moving(pair, label_0, o_t=None) -> np.ndarray:
     """||X_t|| >> 0 with the flow of dense inverse search, or with any other."""
     e_t = expected_flow(pair.reference.depth, pair.X_C1C0, CAMERA)
     o_t = DisFlow()(pair.reference.color, pair.current.color) if o_t is None else o_t
-    return moving_pixels(pair, e_t, o_t, label_0 > 0, MeasurementNoise(), MovingParameters())
+    return moving_pixels(
+        pair, e_t, o_t, standing(pair.reference, label_0 > 0), MeasurementNoise(), MovingParameters()
+    )
 
 
 def test_the_true_flow_of_a_still_scene_is_all_expected() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from riseg_drake.geometry.camera import Intrinsics, pixel_grid
-from riseg_drake.segmentation.expected_flow import expected_flow, flow_of_motion
+from riseg_drake.segmentation.expected_flow import expected_flow, pixel_projection
 
 CAMERA = Intrinsics(64, 48, 60.0, 61.0, 30.5, 24.25)
 
@@ -54,10 +54,11 @@ def test_invalid_depth_has_no_flow() -> None:
     assert np.count_nonzero(np.isnan(flow)) == 2
 
 
-def test_the_flow_of_a_region_is_the_same_as_there_in_the_whole() -> None:
-    rng = np.random.default_rng(0)
-    depth = rng.uniform(0.3, 1, CAMERA.shape).astype(np.float32)
-    X = RigidTransform(RollPitchYaw(0.1, 0, 0.2), [0.1, 0, 0]).GetAsMatrix4()
-    region = (slice(5, 20), slice(7, 60))
-    whole = flow_of_motion(depth, X, CAMERA)
-    np.testing.assert_array_equal(flow_of_motion(depth[region], X, CAMERA, region), whole[region])
+def test_the_projective_map_of_pixels_moves_and_projects_points_as_drake_does() -> None:
+    X = RigidTransform(RollPitchYaw(0.1, -0.05, 0.2), [0.1, 0.03, -0.02])
+    K = np.array([[60.0, 0, 30.5], [0, 61.0, 24.25], [0, 0, 1]])
+    for u, v, z in ((3.0, 40.0, 0.4), (50.5, 7.25, 1.7)):
+        a, b, c = pixel_projection(X.GetAsMatrix4(), CAMERA) @ [u, v, 1.0, 1 / z]
+        p_C1Q = X @ (z * np.linalg.inv(K) @ [u, v, 1.0])
+        np.testing.assert_allclose([a / c, b / c], (K @ p_C1Q / p_C1Q[2])[:2], atol=1e-4)
+        np.testing.assert_allclose(c * z, p_C1Q[2], rtol=1e-6)

@@ -16,6 +16,7 @@ from riseg_drake.segmentation.motions import (
     settle_groups,
     with_earlier_motions,
 )
+from riseg_drake.segmentation.twists import point_precision
 
 FOCAL_LENGTH, DEPTH_NOISE, FLOW_NOISE = 600.0, 0.002, 0.2
 CENTRE = np.array([0.02, -0.01, 0.42])
@@ -25,6 +26,10 @@ def about_centre(omega: float, x: float, y: float) -> np.ndarray:
     """The motion of a body that turns about C0's z axis through CENTRE and shifts."""
     X = translation(CENTRE) @ exp_se3(np.array([0, 0, omega, 0, 0, 0])) @ translation(-CENTRE)
     return translation(np.array([x, y, 0.0])) @ X
+
+
+def precision(frames: BodyFrames) -> np.ndarray:
+    return point_precision(frames.p_C0Q0, frames.depth_1, frames.flow_sigma, DEPTH_NOISE, FOCAL_LENGTH)
 
 
 def moved_frames(
@@ -51,7 +56,7 @@ def moved_frames(
 )
 def test_a_groups_motion_is_found_in_noisy_points(X: np.ndarray) -> None:
     frames, group = moved_frames([X], np.random.default_rng(0))
-    (found,) = group_motions(frames, group, DEPTH_NOISE, FOCAL_LENGTH)
+    (found,) = group_motions(frames, group, precision(frames))
     assert np.linalg.norm(log_se3(inverse(X) @ found)[:3]) < np.deg2rad(1)
     assert np.linalg.norm(move_points(found, CENTRE) - move_points(X, CENTRE)) < 5e-4
 
@@ -60,18 +65,18 @@ def test_each_group_gets_its_own_motion_and_frames_of_none_count_for_none() -> N
     truth = [about_centre(0.1, 0.0, 0.0), about_centre(0.0, 0.005, 0.0), about_centre(0.0, -0.05, 0.05)]
     frames, group = moved_frames(truth, np.random.default_rng(1), noisy=False)
     group[group == 2] = -1
-    np.testing.assert_allclose(group_motions(frames, group, DEPTH_NOISE, FOCAL_LENGTH), truth[:2], atol=1e-7)
+    np.testing.assert_allclose(group_motions(frames, group, precision(frames)), truth[:2], atol=1e-7)
 
 
 def test_no_groups_have_no_motions() -> None:
     frames, _ = moved_frames([np.eye(4)], np.random.default_rng(2), count=4)
-    assert group_motions(frames, np.full(4, -1), DEPTH_NOISE, FOCAL_LENGTH).shape == (0, 4, 4)
+    assert group_motions(frames, np.full(4, -1), precision(frames)).shape == (0, 4, 4)
 
 
 def merged(motions: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """The groups before and after merging frames that move so."""
     frames, group = moved_frames(motions, np.random.default_rng(3), noisy=False)
-    fitted = group_motions(frames, group, DEPTH_NOISE, FOCAL_LENGTH)
+    fitted = group_motions(frames, group, precision(frames))
     return group, merge_equal_motions(frames, group, fitted, FOCAL_LENGTH, MotionParameters())
 
 
@@ -95,7 +100,7 @@ def test_a_group_that_stands_still_is_dropped_and_the_rest_renumbered() -> None:
 def test_a_frame_settles_in_the_group_whose_motion_explains_it() -> None:
     motions = [about_centre(0.1, 0.0, 0.0), about_centre(0.0, 0.006, 0.0)]
     frames, truth = moved_frames([*motions, about_centre(0.0, -0.03, 0.02)], np.random.default_rng(4))
-    misfit = misfits(frames, np.array(motions), DEPTH_NOISE, FOCAL_LENGTH)
+    misfit = misfits(frames, np.array(motions), precision(frames))
     assert np.median(misfit[truth == 0, 0]) == pytest.approx(1.0, abs=0.4)
     settled = settle_groups(frames, misfit, np.ones(len(frames)), MotionParameters())
     at_all = truth < 2

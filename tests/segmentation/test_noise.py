@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from riseg_drake.segmentation.noise import MeasurementNoise, depth_sigma, flow_sigma, smooth_gray
+from riseg_drake.geometry.rgbd import smooth_gray
+from riseg_drake.segmentation.noise import MeasurementNoise, depth_sigma, flow_sigma
 from riseg_drake.segmentation.optical_flow import DisFlow
 from tests.segmentation.drawn_scene import Texture
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from riseg_drake.segmentation.optical_flow import DIS_PRESETS, DisFlow, DisFlowParameters
-from tests.segmentation.drawn_scene import Texture
+from riseg_drake.segmentation.expected_flow import expected_flow
+from riseg_drake.segmentation.optical_flow import DIS_PRESETS, DisFlow, DisFlowParameters, flow_around
+from tests.segmentation.drawn_scene import CAMERA, DrawnScene, Texture, looking_down, planar, standing
 
 HEIGHT, WIDTH = 120, 160
 INTERIOR = (slice(16, -16), slice(16, -16))
@@ -39,3 +40,24 @@ def test_the_same_images_give_the_same_flow_to_the_bit() -> None:
 def test_an_unknown_preset_is_refused_with_the_choices() -> None:
     with pytest.raises(ValueError, match=r"'best'.*ultrafast, fast, medium"):
         DisFlow(DisFlowParameters(preset="best"))
+
+
+@pytest.mark.parametrize("x", [0.0, 0.05, 0.3])
+def test_flow_around_objects_follows_a_camera_that_moves_far(x: float) -> None:
+    scene = DrawnScene([(0.07, 0.06, 0.03), (0.06, 0.08, 0.05)])
+    places = [planar(-0.06, 0.0, 0.3), planar(0.06, 0.02)]
+    pair, label_0, label_1 = scene.pair((looking_down(), looking_down(x=x)), (places, places))
+    flow = flow_around(standing(pair.reference, label_0 > 0), pair, DisFlow())
+    assert flow.shape == (*label_0.shape, 2)
+    if not label_1.any():
+        assert np.isnan(flow[label_0 > 0]).mean() > 0.5
+        return
+    known = (label_0 > 0) & np.isfinite(flow).all(-1)
+    expected = expected_flow(pair.reference.depth, pair.X_C1C0, CAMERA)
+    assert known.sum() > 0.9 * (label_0 > 0).sum()
+    assert np.nanmedian(np.linalg.norm(flow - expected, axis=-1)[known]) < 0.3
+
+
+def test_there_is_no_flow_where_nothing_stands() -> None:
+    pair, label_0, _ = DrawnScene([(0.07, 0.06, 0.03)]).pair((looking_down(),) * 2, ([planar(0, 0)],) * 2)
+    assert np.isnan(flow_around(standing(pair.reference, label_0 < 0), pair, DisFlow())).all()

@@ -13,6 +13,7 @@ from tests.segmentation.drawn_scene import (
     looking_down,
     motion_seen_from,
     planar,
+    standing,
 )
 
 SIZES = [(0.07, 0.06, 0.03), (0.06, 0.08, 0.05), (0.05, 0.05, 0.02)]
@@ -21,7 +22,7 @@ NOTHING = np.zeros(CAMERA.shape, np.uint16)
 
 
 def carried(pair: FramePair, label_0, motions, label_1, remembered=NOTHING) -> np.ndarray:
-    return carry_labels(pair, label_0, motions, label_1 > 0, remembered)
+    return carry_labels(pair, label_0, motions, standing(pair.current, label_1 > 0), remembered)
 
 
 def move(place: np.ndarray, x: float, y: float, yaw: float) -> np.ndarray:

@@ -37,6 +37,10 @@ TWISTS = [
 ]
 
 
+def precision(frames: BodyFrames) -> np.ndarray:
+    return point_precision(frames.p_C0Q0, frames.depth_1, frames.flow_sigma, 0.002, 600.0)
+
+
 @pytest.mark.parametrize("V", TWISTS)
 def test_all_triplets_on_one_body_have_its_twist(V: np.ndarray) -> None:
     frames = moved_frames(V, np.random.default_rng(0), points=3)
@@ -47,7 +51,7 @@ def test_all_triplets_on_one_body_have_its_twist(V: np.ndarray) -> None:
 @pytest.mark.parametrize("V", TWISTS)
 def test_all_patches_on_one_body_have_its_twist(V: np.ndarray) -> None:
     frames = moved_frames(V, np.random.default_rng(1))
-    twists = patch_twists(frames, np.zeros(3), depth_noise=0.002, focal_length=600)
+    twists = patch_twists(frames, np.zeros(3), precision(frames))
     np.testing.assert_allclose(twists.V_S, np.broadcast_to(V, (30, 6)), atol=1e-8)
 
 
@@ -56,7 +60,7 @@ def test_another_space_frame_shows_the_same_motion(kind) -> None:
     V = TWISTS[2]
     p_C0S = np.array([0.05, -0.02, 0.45])
     frames = moved_frames(V, np.random.default_rng(2), points=3 if kind is triplet_twists else 20)
-    arguments = () if kind is triplet_twists else (0.002, 600)
+    arguments = () if kind is triplet_twists else (precision(frames),)
     twists = kind(frames, p_C0S, *arguments)
     p_SQ = np.array([[0.01, 0.02, 0.03]])
     moved_in_S = move_points(exp_se3(twists.V_S[0]), p_SQ)
@@ -108,10 +112,8 @@ def test_a_few_points_of_another_body_hardly_move_the_fit() -> None:
     V = TWISTS[1]
     frames = moved_frames(V, np.random.default_rng(5), count=10)
     frames.p_C0Q1[:, :4] += 0.02
-    twists = patch_twists(frames, np.array([0, 0, 0.45]), 0.002, 600.0)
-    clean = patch_twists(
-        moved_frames(V, np.random.default_rng(5), count=10), np.array([0, 0, 0.45]), 0.002, 600.0
-    )
+    undisturbed = moved_frames(V, np.random.default_rng(5), count=10)
+    twists, clean = (patch_twists(f, np.array([0, 0, 0.45]), precision(f)) for f in (frames, undisturbed))
     assert np.abs(twists.V_S - clean.V_S)[:, 3:].max() < 0.002
     assert (twists.misfit > 5 * clean.misfit).all()
 

@@ -9,7 +9,7 @@ from tests.systems.ports import evaluate, port_names
 
 
 def test_ports_have_the_names_of_the_contract() -> None:
-    assert port_names(OpticalFlow()) == (["pair"], ["optical_flow"])
+    assert port_names(OpticalFlow()) == (["pair", "above_table"], ["optical_flow"])
 
 
 @pytest.mark.parametrize("preset", [None, "fast"])
@@ -19,6 +19,14 @@ def test_dense_inverse_search_goes_from_the_reference_to_the_current_frame(paylo
     assert flow.dtype == np.float32
     images = payloads.pair.reference.color, payloads.pair.current.color
     np.testing.assert_array_equal(flow, (method or DisFlow())(*images))
+
+
+def test_where_nothing_stands_no_flow_is_worked_out(payloads) -> None:
+    flow = evaluate(OpticalFlow(), "optical_flow", pair=payloads.pair, above_table=payloads.above_0)
+    whole = evaluate(OpticalFlow(), "optical_flow", pair=payloads.pair)
+    mask = payloads.above_0.mask
+    assert np.isnan(flow).any()
+    assert np.median(np.linalg.norm(flow[mask] - whole[mask], axis=-1)) < 0.2
 
 
 def test_anything_that_can_be_called_stands_in_for_it(payloads) -> None:

@@ -1,0 +1,83 @@
+"""Some pixels of one view, ready to be sought in another one: under this motion, and that, and that."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.geometry.rgbd import Immutable
+from riseg_drake.segmentation.expected_flow import pixel_projection
+
+_ROW = 256
+"""Pixels are handed to OpenCV in rows of so many: it wants images, and none longer than 32767."""
+
+
+@dataclass(frozen=True)
+class SurfacePixels(Immutable):
+    """N pixels of a view C0 that all have depth."""
+
+    pixel: NDArray[np.intp]
+    """[2, N], (v, u)."""
+    depth: NDArray[np.float32]
+    """[N], m."""
+    intrinsics: Intrinsics
+    homogeneous: NDArray[np.float32]
+    """[4, R * 256], (u, v, 1, 1 / z), the last ones repeated to fill whole rows."""
+
+    def __len__(self) -> int:
+        """The number of pixels N."""
+        return len(self.depth)
+
+
+@dataclass(frozen=True)
+class Sought:
+    """Where the pixels of a `SurfacePixels` appear in another view C1."""
+
+    u: NDArray[np.float32]
+    """[R, 256], pixels."""
+    v: NDArray[np.float32]
+    """[R, 256], pixels."""
+    depth: NDArray[np.float32]
+    """[N], m; not positive for points that are not ahead of C1."""
+
+    def read(self, image: NDArray, outside: float = 0) -> NDArray:
+        """The values [N] of the nearest pixels of an image of C1; `outside` beyond its edges."""
+        return self._read(image, cv2.INTER_NEAREST, outside)
+
+    def read_between(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The values [N] of an image of C1, interpolated; NaN beyond its edges and beside any NaN."""
+        return self._read(image, cv2.INTER_LINEAR, float("nan"))
+
+    def _read(self, image: NDArray, interpolation: int, outside: float) -> NDArray:
+        values = cv2.remap(
+            image, self.u, self.v, interpolation, borderMode=cv2.BORDER_CONSTANT, borderValue=outside
+        )
+        return values.ravel()[: len(self.depth)]
+
+
+def surface_pixels(
+    mask: NDArray[np.bool_], depth: NDArray[np.float32], intrinsics: Intrinsics
+) -> SurfacePixels:
+    """The pixels of a mask [H, W] that have depth [H, W] (m, 0 = none), row by row."""
+    index = np.flatnonzero(mask & (depth > 0))
+    v, u = np.divmod(index, depth.shape[1])
+    z = depth.ravel()[index]
+    filled = -(-max(len(z), 1) // _ROW) * _ROW
+    homogeneous = np.ones((4, filled), np.float32)
+    if len(z):
+        homogeneous[0, : len(z)], homogeneous[1, : len(z)], homogeneous[3, : len(z)] = u, v, 1 / z
+    return SurfacePixels(np.stack([v, u]), z, intrinsics, homogeneous)
+
+
+def seek(pixels: SurfacePixels, X_C1C0: NDArray[np.float64]) -> Sought:
+    """Where the points behind some pixels of C0 appear in C1, if X_C1C0 [4, 4] takes them there."""
+    a, b, c = pixel_projection(X_C1C0, pixels.intrinsics) @ pixels.homogeneous
+    depth = pixels.depth * c[: len(pixels)]
+    if c.min() <= 0:
+        # What is not ahead of the camera is sought far outside the image.
+        a, b, c = np.where(c > 0, (a, b, c), np.float32([[-1e4], [-1e4], [1]]))
+    a /= c
+    b /= c
+    return Sought(a.reshape(-1, _ROW), b.reshape(-1, _ROW), depth)
