@@ -42,16 +42,13 @@ def test_an_unknown_preset_is_refused_with_the_choices() -> None:
         DisFlow(DisFlowParameters(preset="best"))
 
 
-@pytest.mark.parametrize("x", [0.0, 0.05, 0.3])
+@pytest.mark.parametrize("x", [0.0, 0.05])
 def test_flow_around_objects_follows_a_camera_that_moves_far(x: float) -> None:
     scene = DrawnScene([(0.07, 0.06, 0.03), (0.06, 0.08, 0.05)])
     places = [planar(-0.06, 0.0, 0.3), planar(0.06, 0.02)]
-    pair, label_0, label_1 = scene.pair((looking_down(), looking_down(x=x)), (places, places))
+    pair, label_0, _ = scene.pair((looking_down(), looking_down(x=x)), (places, places))
     flow = flow_around(standing(pair.reference, label_0 > 0), pair, DisFlow())
     assert flow.shape == (*label_0.shape, 2)
-    if not label_1.any():
-        assert np.isnan(flow[label_0 > 0]).mean() > 0.5
-        return
     known = (label_0 > 0) & np.isfinite(flow).all(-1)
     expected = expected_flow(pair.reference.depth, pair.X_C1C0, CAMERA)
     assert known.sum() > 0.9 * (label_0 > 0).sum()
@@ -61,3 +58,9 @@ def test_flow_around_objects_follows_a_camera_that_moves_far(x: float) -> None:
 def test_there_is_no_flow_where_nothing_stands() -> None:
     pair, label_0, _ = DrawnScene([(0.07, 0.06, 0.03)]).pair((looking_down(),) * 2, ([planar(0, 0)],) * 2)
     assert np.isnan(flow_around(standing(pair.reference, label_0 < 0), pair, DisFlow())).all()
+
+
+def test_what_the_camera_has_left_behind_has_no_flow() -> None:
+    scene, places = DrawnScene([(0.07, 0.06, 0.03)]), [planar(0, 0)]
+    pair, label_0, _ = scene.pair((looking_down(), looking_down(x=0.5)), (places, places))
+    assert np.isnan(flow_around(standing(pair.reference, label_0 > 0), pair, DisFlow())).all()
