@@ -6,7 +6,7 @@ images best, in gray value and in depth. Pieces of the image that have no textur
 decided by their edges, and borders between labels follow edges of colour and height.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.camera import Region, bounding_region
 from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
 from riseg_drake.segmentation.above_table import AboveTable
+from riseg_drake.segmentation.alignment import AlignmentParameters, EdgePixels, edge_pixels
 from riseg_drake.segmentation.noise import MeasurementNoise, depth_sigma, gray_variance
 from riseg_drake.segmentation.potts import PottsGraph, potts_labels
-from riseg_drake.segmentation.superpixels import Superpixels, superpixels
+from riseg_drake.segmentation.superpixels import Superpixels, blank_surfaces, superpixels
 from riseg_drake.segmentation.surface import SurfacePixels, seek, surface_pixels
 
 _NO_EVIDENCE = np.float32(2)
@@ -40,6 +41,9 @@ class MotionLabelParameters:
     """Cost of a border between labels, for each pixel of its length, where there is no edge at all."""
     contrast: float = 8.0
     """Gray levels across a border that lower its cost to 1/e."""
+    surface_min: float = 3.0e-4
+    """m^2; a blank surface of that size may need a motion of its own."""
+    alignment: AlignmentParameters = field(default_factory=AlignmentParameters)
     gain_min: float = 0.25
     """A motion must explain the pixels it wins so much better, on average, than any single other one."""
 
@@ -64,6 +68,8 @@ class ReferencePieces(Immutable):
     """[N], gray value of each witness."""
     variance: NDArray[np.float32]
     """[N], of the difference between that and where it should reappear."""
+    edges: EdgePixels
+    """What sharpens the motions."""
 
 
 def cut_pieces(
@@ -79,6 +85,8 @@ def cut_pieces(
     core = cv2.erode((whole >= 0).astype(np.uint8), _RIM, borderValue=0) > 0
     witnesses = surface_pixels(core, reference.depth, reference.intrinsics)
     v, u = witnesses.pixel
+    area_min = parameters.surface_min * above_0.pixels_per_metre(reference.intrinsics) ** 2
+    variance = gray_variance(reference.gray, noise)
     return ReferencePieces(
         region=region,
         pieces=pieces,
@@ -91,7 +99,10 @@ def cut_pieces(
         witnesses=witnesses,
         piece=whole[v, u],
         gray=reference.gray[v, u],
-        variance=gray_variance(reference.gray, noise)[v, u],
+        variance=variance[v, u],
+        edges=edge_pixels(
+            reference, whole, variance, blank_surfaces(pieces, area_min), noise, parameters.alignment.pixels
+        ),
     )
 
 

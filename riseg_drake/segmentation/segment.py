@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.camera import back_project, bounding_region, pixel_grid
 from riseg_drake.geometry.rgbd import FramePair, Immutable
 from riseg_drake.segmentation.above_table import AboveTable
+from riseg_drake.segmentation.alignment import align_motions
 from riseg_drake.segmentation.association import (
     UNKNOWN,
     AssociationParameters,
@@ -162,6 +163,14 @@ def segment(
         if parameters.outline == "motion" and now.pieces is None:
             pieces = cut_pieces(pair.reference, above_0, parameters.noise, parameters.labels)
             now = replace(now, pieces=pieces)
+        if now.pieces is not None:
+            motions = align_motions(
+                pair,
+                now.pieces.edges,
+                motions,
+                above_0.depth_noise,
+                parameters.labels.alignment,
+            )
         moving = _grow(now, pair, expected_flow, optical_flow, groups, motions, above_0, parameters)
         now = _decide(now, pair, groups, motions, moving, above_0, parameters)
     if parameters.propagation == "flow":

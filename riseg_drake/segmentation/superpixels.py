@@ -5,9 +5,13 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components
 
 _HEIGHT_STEPS = 2000.0
 """Gray levels a metre of height is worth beside colour: half a millimetre is one level."""
+_BLANK = 6.0
+"""Gray levels; two pieces that differ no more across their border are one surface, noise and all."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,19 @@ def superpixels(
     nearest[index[own]] = flooded[own]
     label = np.where(mask, nearest[index], 0) - 1
     return _with_borders(label, len(v), image)
+
+
+def blank_surfaces(pieces: Superpixels, area_min: float) -> NDArray[np.intp]:
+    """The surface 0.. that each piece [N] is part of, where pieces without any edge between them make one.
+
+    -1 for the pieces of surfaces smaller than `area_min` pixels.
+    """
+    same = pieces.borders[pieces.contrast < _BLANK]
+    graph = csr_matrix((np.ones(len(same)), (same[:, 0], same[:, 1])), shape=(pieces.count, pieces.count))
+    count, surface = connected_components(graph, directed=False)
+    area = np.bincount(surface[pieces.label[pieces.label >= 0]], minlength=count)
+    number = np.where(area >= area_min, np.cumsum(area >= area_min) - 1, -1)
+    return number[surface]
 
 
 def _edges_image(color: NDArray[np.uint8], height: NDArray[np.float32]) -> NDArray[np.uint8]:

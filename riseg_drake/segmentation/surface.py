@@ -30,6 +30,10 @@ class SurfacePixels(Immutable):
         """The number of pixels N."""
         return len(self.depth)
 
+    def subset(self, which: NDArray[np.intp]) -> "SurfacePixels":
+        """Some of the pixels, by their numbers."""
+        return _rows_of_pixels(self.pixel[:, which], self.depth[which], self.intrinsics)
+
 
 @dataclass(frozen=True)
 class Sought:
@@ -62,13 +66,18 @@ def surface_pixels(
 ) -> SurfacePixels:
     """The pixels of a mask [H, W] that have depth [H, W] (m, 0 = none), row by row."""
     index = np.flatnonzero(mask & (depth > 0))
-    v, u = np.divmod(index, depth.shape[1])
-    z = depth.ravel()[index]
-    filled = -(-max(len(z), 1) // _ROW) * _ROW
-    homogeneous = np.ones((4, filled), np.float32)
-    if len(z):
-        homogeneous[0, : len(z)], homogeneous[1, : len(z)], homogeneous[3, : len(z)] = u, v, 1 / z
-    return SurfacePixels(np.stack([v, u]), z, intrinsics, homogeneous)
+    pixel = np.stack(np.divmod(index, depth.shape[1]))
+    return _rows_of_pixels(pixel, depth.ravel()[index], intrinsics)
+
+
+def _rows_of_pixels(
+    pixel: NDArray[np.intp], depth: NDArray[np.float32], intrinsics: Intrinsics
+) -> SurfacePixels:
+    count = len(depth)
+    homogeneous = np.ones((4, -(-max(count, 1) // _ROW) * _ROW), np.float32)
+    if count:
+        homogeneous[0, :count], homogeneous[1, :count], homogeneous[3, :count] = pixel[1], pixel[0], 1 / depth
+    return SurfacePixels(pixel, depth, intrinsics, homogeneous)
 
 
 def seek(pixels: SurfacePixels, X_C1C0: NDArray[np.float64]) -> Sought:

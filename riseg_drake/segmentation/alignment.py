@@ -1,0 +1,229 @@
+"""The groups' motions, sharpened on the images themselves before pixels are asked which one is theirs.
+
+A body frame knows its motion from flow inside a few centimetres. A blank body has flow at its edges
+only, each of which tells one direction. Here every pixel with a gradient takes part, wherever on the
+body it lies: the motion that makes the second image agree with the first, in gray value and in depth,
+is found by Gauss-Newton from where the group's motion starts. Nothing of it is in the paper.
+"""
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.camera import rays
+from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
+from riseg_drake.geometry.se3 import exp_se3, move_points, translation
+from riseg_drake.segmentation.motions import flow_difference
+from riseg_drake.segmentation.noise import MeasurementNoise, depth_sigma
+from riseg_drake.segmentation.surface import Sought, SurfacePixels, seek, surface_pixels
+
+_GRADIENT_MIN = 1.0
+"""Squared gray gradient of a pixel that tells where it is, in variances of the sensor's noise."""
+_CORRELATED = 6.0
+"""Noise of depth is correlated over about so many pixels; they count as one."""
+_COST_MAX = np.float32(9)
+"""Squared normalised residuals count no more than that."""
+_LOOSE_TURN, _LOOSE_SHIFT, _LOOSE_ROUNDS = 0.1, 0.01, 6
+"""rad, m and Gauss-Newton steps for a surface of which no body frame says how it moves."""
+
+
+@dataclass
+class AlignmentParameters:
+    """How motions are sharpened."""
+
+    rounds: int = 2
+    """Gauss-Newton steps; 0 leaves the motions as the body frames have them."""
+    pixels: int = 4000
+    """At most so many pixels of the reference frame take part."""
+    turn: float = 0.03
+    """rad; how well the body frames know a motion's rotation."""
+    shift: float = 0.0015
+    """m; how well they know where it takes the body's centre."""
+    outlier: float = 4.0
+    """Squared normalised residual from which a pixel counts ever less."""
+    members_min: int = 60
+    """Pixels that a motion needs to be sharpened."""
+    same_flow: float = 0.35
+    """Pixels (root mean square); motions that predict flow within that are one."""
+    explained: float = 4.0
+    """Mean squared residuals (gray and depth, 2 where a motion is right) up to which the edges of a blank
+    surface are explained and need no motion of their own."""
+    gain_min: float = 1.0
+    """By how much a motion of its own must explain them better."""
+
+
+@dataclass(frozen=True)
+class EdgePixels(Immutable):
+    """The pixels of the reference frame whose gray values tell where they are at t."""
+
+    surface: SurfacePixels
+    p_C0Q: NDArray[np.float64]
+    """[N, 3], their points, m."""
+    piece: NDArray[np.intp]
+    """[N], of the pieces that decide as one."""
+    gray: NDArray[np.float32]
+    """[N]."""
+    variance: NDArray[np.float32]
+    """[N], of the difference between that and where it should reappear."""
+    surface_of_piece: NDArray[np.intp]
+    """[pieces], the large blank surface that each belongs to, 0.., or -1."""
+
+    def subset(self, which: NDArray[np.intp]) -> "EdgePixels":
+        """Some of the pixels, by their numbers."""
+        return EdgePixels(
+            self.surface.subset(which),
+            self.p_C0Q[which],
+            self.piece[which],
+            self.gray[which],
+            self.variance[which],
+            self.surface_of_piece,
+        )
+
+
+def align_motions(
+    pair: FramePair,
+    edges: EdgePixels,
+    motions: NDArray[np.float64],
+    depth_noise: float,
+    parameters: AlignmentParameters,
+) -> NDArray[np.float64]:
+    """Motions [G', 4, 4] in C0: the given ones sharpened, and those of blank surfaces that none explains.
+
+    Args:
+        pair: the frames of t-1 and t.
+        edges: of the frame of t-1.
+        motions: [G, 4, 4] in C0, to start from.
+        depth_noise: standard deviation of depth at 1 m, m.
+        parameters: see there.
+    """
+    if not len(edges.piece) or parameters.rounds == 0:
+        return motions
+    image_1 = _Image(pair, depth_noise)
+    cost = np.array([image_1.cost(edges, motion) for motion in (np.eye(4), *motions)])
+    pieces = int(edges.piece.max()) + 1
+    owner = np.argmin([np.bincount(edges.piece, c, pieces) for c in cost], axis=0)[edges.piece]
+    focal_length = pair.current.intrinsics.fx
+    aligned: list[NDArray] = []
+    for g, motion in enumerate(motions):
+        mine = np.flatnonzero(owner == g + 1)
+        if len(mine) >= parameters.members_min:
+            motion, _ = image_1.align(edges.subset(mine), motion, parameters.rounds, parameters)
+        p_C0Q = edges.p_C0Q[mine] if len(mine) else edges.p_C0Q
+        if all(flow_difference(p_C0Q, motion, X, focal_length) > parameters.same_flow for X in aligned):
+            aligned.append(motion)
+    for surface in range(int(edges.surface_of_piece.max()) + 1):
+        mine = np.flatnonzero(edges.surface_of_piece[edges.piece] == surface)
+        if len(mine) < parameters.members_min or cost[:, mine].mean(1).min() < parameters.explained:
+            continue
+        proposed = _propose(image_1, edges.subset(mine), aligned, parameters)
+        if proposed is not None:
+            aligned.append(proposed)
+    return np.array(aligned).reshape(-1, 4, 4)
+
+
+def _propose(
+    image_1: "_Image", edges: EdgePixels, motions: list[NDArray], parameters: AlignmentParameters
+) -> NDArray | None:
+    """A motion of one surface that explains it clearly better than the known ones do, if there is one."""
+    known = sorted(
+        ((float(image_1.cost(edges, X).mean()), k, X) for k, X in enumerate((np.eye(4), *motions))),
+    )
+    loose = replace(parameters, turn=_LOOSE_TURN, shift=_LOOSE_SHIFT)
+    proposals = [image_1.align(edges, X, _LOOSE_ROUNDS, loose) for _, _, X in known[:3]]
+    motion, cost = min(proposals, key=lambda proposal: proposal[1])
+    return motion if cost < known[0][0] - parameters.gain_min else None
+
+
+def edge_pixels(
+    frame: Frame,
+    piece: NDArray[np.intp],
+    variance: NDArray[np.float32],
+    surface_of_piece: NDArray[np.intp],
+    noise: MeasurementNoise,
+    pixels_max: int,
+) -> EdgePixels:
+    """Evenly taken pixels of the pieces [H, W] (-1 = none) that have more gradient than noise has.
+
+    Args:
+        frame: of t-1.
+        piece: [H, W], number of each pixel's piece.
+        variance: [H, W], see `gray_variance`.
+        surface_of_piece: see `EdgePixels`.
+        noise: of the images.
+        pixels_max: at most so many are taken.
+    """
+    contrast = (
+        variance - np.float32(2 * noise.color**2) > noise.registration**2 * _GRADIENT_MIN * noise.color**2
+    )
+    surface = surface_pixels((piece >= 0) & contrast, frame.depth, frame.intrinsics)
+    surface = surface.subset(np.arange(0, len(surface), max(1, -(-len(surface) // pixels_max))))
+    v, u = surface.pixel
+    p_C0Q = rays(frame.intrinsics)[v, u].astype(float) * surface.depth[:, None]
+    return EdgePixels(surface, p_C0Q, piece[v, u], frame.gray[v, u], variance[v, u], surface_of_piece)
+
+
+class _Image:
+    """The frame of t: what pixels of t-1 find there."""
+
+    def __init__(self, pair: FramePair, depth_noise: float) -> None:
+        self.X_C1C0, self.intrinsics = pair.X_C1C0, pair.current.intrinsics
+        self.gray, self.depth = pair.current.unhidden_gray, pair.current.unhidden_depth
+        self.gradient_u = cv2.Sobel(self.gray, cv2.CV_32F, 1, 0, scale=0.125)
+        self.gradient_v = cv2.Sobel(self.gray, cv2.CV_32F, 0, 1, scale=0.125)
+        self.depth_noise = np.sqrt(2) * depth_noise
+
+    def cost(self, edges: EdgePixels, motion: NDArray) -> NDArray[np.float32]:
+        """How badly a motion explains each pixel [N]: 2 where it is right, 18 at most."""
+        gray, depth, _, _ = self._residuals(edges, motion)
+        squared = np.minimum(gray**2, _COST_MAX) + np.minimum(depth**2, _COST_MAX)
+        return np.nan_to_num(squared, nan=2.0)
+
+    def align(
+        self, edges: EdgePixels, motion: NDArray, rounds: int, parameters: AlignmentParameters
+    ) -> tuple[NDArray[np.float64], float]:
+        """One motion [4, 4] fitted to its own pixels, and the mean cost of these then."""
+        centre = move_points(motion, edges.p_C0Q.mean(0)[None])[0]
+        precision = np.repeat([parameters.turn**-2.0, parameters.shift**-2.0], 3)
+        V, X = np.zeros(6), motion
+        for _ in range(rounds):
+            normal, rhs = np.diag(precision), -precision * V
+            for residual, J, count in self._linearised(edges, X, centre):
+                weight = 1 / (1 + residual**2 / parameters.outlier) / count
+                known = np.isfinite(weight) & np.isfinite(J).all(1)
+                J, weight, residual = J[known], weight[known], residual[known]
+                normal = normal + (J * weight[:, None]).T @ J
+                rhs = rhs - J.T @ (weight * residual)
+            step = np.linalg.solve(normal, rhs)
+            V = V + step
+            X = translation(centre) @ exp_se3(step) @ translation(-centre) @ X
+        return X, float(self.cost(edges, X).mean())
+
+    def _linearised(
+        self, edges: EdgePixels, X: NDArray, centre: NDArray
+    ) -> list[tuple[NDArray, NDArray, float]]:
+        """Residuals of gray value and depth [N], their derivatives by a twist about the centre [N, 6], and
+        how many pixels of each say the same."""
+        gray, depth, sigma, sought = self._residuals(edges, X)
+        p = move_points(X, edges.p_C0Q)
+        q = move_points(self.X_C1C0, p)
+        g_u, g_v = (
+            sought.read_between(g) / np.sqrt(edges.variance) for g in (self.gradient_u, self.gradient_v)
+        )
+        along = np.stack([g_u * self.intrinsics.fx, g_v * self.intrinsics.fy], axis=1) / q[:, 2:]
+        R_C1C0 = self.X_C1C0[:3, :3]
+        d_gray = np.column_stack([along, -(along * q[:, :2]).sum(1) / q[:, 2]]) @ R_C1C0
+        d_depth = -R_C1C0[2] / sigma[:, None]
+        return [
+            (residual, np.column_stack([np.cross(p - centre, d_p), d_p]), count)
+            for residual, d_p, count in ((gray, d_gray, 1.0), (depth, d_depth, _CORRELATED))
+        ]
+
+    def _residuals(self, edges: EdgePixels, motion: NDArray) -> tuple[NDArray, NDArray, NDArray, Sought]:
+        """Normalised residuals of gray value and depth [N], the latter's sigma (m), and where all that is."""
+        sought = seek(edges.surface, self.X_C1C0 @ motion)
+        gray = (sought.read_between(self.gray) - edges.gray) / np.sqrt(edges.variance)
+        z_1 = sought.read(self.depth)
+        sigma = depth_sigma(sought.depth, self.depth_noise)
+        return gray, np.where(z_1 > 0, (z_1 - sought.depth) / sigma, np.float32(np.nan)), sigma, sought
