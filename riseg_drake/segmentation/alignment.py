@@ -8,7 +8,6 @@ is found by Gauss-Newton from where the group's motion starts. Nothing of it is 
 
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,7 +34,7 @@ class AlignmentParameters:
 
     rounds: int = 2
     """Gauss-Newton steps; 0 leaves the motions as the body frames have them."""
-    pixels: int = 4000
+    pixels: int = 2500
     """At most so many pixels of the reference frame take part."""
     turn: float = 0.03
     """rad; how well the body frames know a motion's rotation."""
@@ -170,8 +169,6 @@ class _Image:
     def __init__(self, pair: FramePair, depth_noise: float) -> None:
         self.X_C1C0, self.intrinsics = pair.X_C1C0, pair.current.intrinsics
         self.gray, self.depth = pair.current.unhidden_gray, pair.current.unhidden_depth
-        self.gradient_u = cv2.Sobel(self.gray, cv2.CV_32F, 1, 0, scale=0.125)
-        self.gradient_v = cv2.Sobel(self.gray, cv2.CV_32F, 0, 1, scale=0.125)
         self.depth_noise = np.sqrt(2) * depth_noise
 
     def cost(self, edges: EdgePixels, motion: NDArray) -> NDArray[np.float32]:
@@ -209,7 +206,13 @@ class _Image:
         p = move_points(X, edges.p_C0Q)
         q = move_points(self.X_C1C0, p)
         g_u, g_v = (
-            sought.read_between(g) / np.sqrt(edges.variance) for g in (self.gradient_u, self.gradient_v)
+            0.5
+            * (
+                sought.shifted(du, dv).read_between(self.gray)
+                - sought.shifted(-du, -dv).read_between(self.gray)
+            )
+            / np.sqrt(edges.variance)
+            for du, dv in ((1, 0), (0, 1))
         )
         along = np.stack([g_u * self.intrinsics.fx, g_v * self.intrinsics.fy], axis=1) / q[:, 2:]
         R_C1C0 = self.X_C1C0[:3, :3]

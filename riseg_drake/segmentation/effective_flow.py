@@ -81,11 +81,14 @@ def zero_motion_evidence(
     The difference of the squared gray residuals over their variance, [h, w] of a region: about 0 where
     nothing moves, or where there is no texture to tell.
     """
+    # Every other row and column will do for a mean over a window.
+    half = (slice(None, None, 2), slice(None, None, 2))
     I_0, I_1 = pair.reference.gray[region], pair.current.unhidden_gray
-    per_variance = 1 / gray_variance(I_0, noise)
-    uv = pixel_grid(*pair.current.intrinsics.shape)[region]
+    per_variance = 1 / gray_variance(I_0, noise)[half]
+    I_0, uv = I_0[half], pixel_grid(*pair.current.intrinsics.shape)[region][half]
+    E_t, O_t = expected_flow[region][half], optical_flow[region][half]
     costs = []
-    for flow in (expected_flow[region], optical_flow[region]):
+    for flow in (E_t, O_t):
         residual = cv2.remap(I_1, uv + flow, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         residual -= I_0
         residual *= residual
@@ -93,5 +96,8 @@ def zero_motion_evidence(
         costs.append(np.minimum(residual, _COST_MAX))
     worse = costs[0] - costs[1]
     # Behind the robot nothing can be compared, and flow invents something that fits.
-    worse[np.isnan(worse) | np.isnan(expected_flow[region][..., 0])] = 0
-    return cv2.boxFilter(worse, -1, (window, window))
+    worse[np.isnan(worse) | np.isnan(E_t[..., 0])] = 0
+    mean = cv2.boxFilter(worse, -1, (window // 2 | 1,) * 2)
+    height, width = per_variance.shape
+    whole = cv2.resize(mean, (2 * width, 2 * height), interpolation=cv2.INTER_NEAREST)
+    return whole[: region[0].stop - region[0].start, : region[1].stop - region[1].start]

@@ -46,6 +46,10 @@ class Sought:
     depth: NDArray[np.float32]
     """[N], m; not positive for points that are not ahead of C1."""
 
+    def shifted(self, du: float, dv: float) -> "Sought":
+        """The places beside these, by some pixels."""
+        return Sought(self.u + np.float32(du), self.v + np.float32(dv), self.depth)
+
     def read(self, image: NDArray, outside: float = 0) -> NDArray:
         """The values [N] of the nearest pixels of an image of C1; `outside` beyond its edges."""
         return self._read(image, cv2.INTER_NEAREST, outside)
