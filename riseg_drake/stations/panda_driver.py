@@ -27,7 +27,7 @@ _WINDOW = 0.05  # s, over which speeds are judged
 _LONGEST_PREDICTION = 0.02  # s; after a longer gap no more deviation is forgiven
 
 
-class DriverExit(RuntimeError):
+class DriverEndedError(RuntimeError):
     """The driver ends, as the real one does after a command that it was not started for."""
 
 
@@ -35,9 +35,7 @@ class DriverExit(RuntimeError):
 class PandaDriverConfig:
     """How the driver was started, and how strict the robot is."""
 
-    control_mode: str = field(
-        default="position", metadata={"choices": ("status_only", "velocity", "position")}
-    )
+    control_mode: str = field(default="position", metadata={"choices": ("status_only", "velocity", "position")})
     """The driver's --control_mode."""
     expire_sec: float = 0.1
     """Age by wall clock at which a command has expired, s."""
@@ -96,6 +94,10 @@ class PandaDriver:
         """Somebody pressed the stop button."""
         self.robot_mode = USER_STOPPED
 
+    def die(self) -> None:
+        """The driver is gone: the robot stops, and hears nothing until `restart`."""
+        self.robot_mode = IDLE
+
     def restart(self) -> None:
         """The driver was started anew, or the operator has unlocked the robot: no command, hold still."""
         self.robot_mode = IDLE if self._config.control_mode == "status_only" else MOVE
@@ -103,7 +105,7 @@ class PandaDriver:
         self._start(self.q_d)
 
     def tick(self, now: int) -> None:
-        """One millisecond of the robot; `now` is wall time, us. Raises DriverExit."""
+        """One millisecond of the robot; `now` is wall time, us. Raises DriverEndedError."""
         if self.robot_mode == MOVE:
             self._poll(now)
         v_before = self.v_d
@@ -135,19 +137,19 @@ class PandaDriver:
             "torque": command.num_joint_torque,
         }
         if command.control_mode_expected != _EXPECTED[mode]:
-            raise DriverExit(
+            raise DriverEndedError(
                 f"control_mode_expected is {command.control_mode_expected}, but the driver runs with "
                 f"--control_mode={mode}, which is {_EXPECTED[mode]}"
             )
         for other in sorted(present.keys() - {mode}):
             if present[other]:
-                raise DriverExit(f"joint_{other} must be empty with --control_mode={mode}")
+                raise DriverEndedError(f"joint_{other} must be empty with --control_mode={mode}")
         if abs(now - command.utime) > 1e6 * self._config.expire_sec:
             self._command = None
             self._hold(self._target)
             return
         if present[mode] != 7:
-            raise DriverExit(f"joint_{mode} has {present[mode]} values, not 7")
+            raise DriverEndedError(f"joint_{mode} has {present[mode]} values, not 7")
         if self._is_new:
             self._is_new = False
             self._take(np.array(getattr(command, f"joint_{mode}"), np.float64), command.utime)
@@ -155,7 +157,7 @@ class PandaDriver:
     def _take(self, target: NDArray, utime: int) -> None:
         """Follow a new command, unless it breaks with those before it."""
         if not np.isfinite(target).all():
-            raise DriverExit("commanding value is infinite or NaN")
+            raise DriverEndedError("commanding value is infinite or NaN")
         config, position = self._config, self._config.control_mode == "position"
         gap = 0.005 if self._utime is None else (utime - self._utime) / 1e6
         gap = min(max(gap, _TICK), config.expire_sec)
@@ -163,9 +165,7 @@ class PandaDriver:
         step = target - self._target
         if position:
             surprise = np.abs(step - self._rate * gap)
-            forgiven = (
-                PANDA_LIMITS.acceleration * allowed**2 + np.abs(self._rate) * config.jitter + config.step
-            )
+            forgiven = PANDA_LIMITS.acceleration * allowed**2 + np.abs(self._rate) * config.jitter + config.step
             reason = "joint_motion_generator_velocity_discontinuity"
         else:
             surprise = np.abs(step)
