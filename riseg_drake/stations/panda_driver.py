@@ -23,7 +23,8 @@ _EXPECTED = {
     "position": lcmt_panda_status.CONTROL_MODE_POSITION,
 }
 _TICK = 1e-3  # s, of the robot
-_WINDOW = 0.05  # s, over which speeds are judged
+_WINDOW = 0.025  # s; acceleration is judged by the mean speeds in two of them, one after the other
+_LONG_WINDOW = 0.1  # s; speed is judged by its mean in one of these
 _LONGEST_PREDICTION = 0.02  # s; after a longer gap no more deviation is forgiven
 
 
@@ -41,7 +42,7 @@ class PandaDriverConfig:
     """Age by wall clock at which a command has expired, s."""
     low_pass_freq: float = 30.0
     """Cut-off of the filter that every command passes, Hz."""
-    jitter: float = 0.005
+    jitter: float = 0.003
     """By how much a command's stamp may be off the time that it was planned for, s."""
     step: float = 5e-4
     """Discontinuity that is always forgiven, rad (in velocity mode 20 times this, rad/s)."""
@@ -72,9 +73,7 @@ class PandaDriver:
     def _hold(self, q: NDArray) -> None:
         """No stream is coming in: stay at q [7], or at zero speed."""
         self._target = q.copy() if self._config.control_mode != "velocity" else np.zeros(7)
-        self._rate = np.zeros(7)  # of the targets, from one to the next
-        self._utime: int | None = None  # of the last command of the stream
-        self._mark: tuple[int, NDArray, NDArray] | None = None  # a stamp, target, and speed before it
+        self._stream: list[tuple[int, NDArray]] = []  # stamps and targets of the last tenth of a second
 
     @property
     def is_moving(self) -> bool:
@@ -158,48 +157,61 @@ class PandaDriver:
         """Follow a new command, unless it breaks with those before it."""
         if not np.isfinite(target).all():
             raise DriverEndedError("commanding value is infinite or NaN")
-        config, position = self._config, self._config.control_mode == "position"
-        gap = 0.005 if self._utime is None else (utime - self._utime) / 1e6
-        gap = min(max(gap, _TICK), config.expire_sec)
-        allowed = min(gap, _LONGEST_PREDICTION)
-        step = target - self._target
-        if position:
-            surprise = np.abs(step - self._rate * gap)
-            forgiven = PANDA_LIMITS.acceleration * allowed**2 + np.abs(self._rate) * config.jitter + config.step
-            reason = "joint_motion_generator_velocity_discontinuity"
-        else:
-            surprise = np.abs(step)
-            forgiven = PANDA_LIMITS.acceleration * (allowed + config.jitter) + 20 * config.step
-            reason = "joint_motion_generator_acceleration_discontinuity"
-        if (surprise > forgiven).any():
-            return self.enter_reflex(reason)
-        if position and not PANDA_LIMITS.contains(target):
-            return self.enter_reflex("joint_motion_generator_position_limits_violation")
-        if not position and (np.abs(target) > PANDA_LIMITS.velocity).any():
-            return self.enter_reflex("joint_motion_generator_velocity_limits_violation")
-        if position:
-            self._judge_speed(target, utime)
-        self._rate = step / gap
-        self._target, self._utime = target, utime
+        if not self._stream:  # it stood still until now
+            self._stream = [(utime - int(2e6 * _LONG_WINDOW), self._target), (utime - 5000, self._target)]
+        gap = (utime - self._stream[-1][0]) / 1e6
+        gap = min(max(gap, _TICK), self._config.expire_sec)
+        break_of_stream = (
+            self._position_break if self._config.control_mode == "position" else self._velocity_break
+        )
+        reason = break_of_stream(target, gap)
+        if reason:
+            return self.enter_reflex(f"joint_motion_generator_{reason}")
+        self._target = target
+        earliest = utime - int(2e6 * _LONG_WINDOW)
+        self._stream = [item for item in self._stream if earliest <= item[0] < utime] + [(utime, target)]
 
-    def _judge_speed(self, q: NDArray, utime: int) -> None:
-        """Velocity and acceleration of a stream of positions, over windows that even out the jitter."""
-        if self._mark is None:
-            self._mark = (utime, q, np.zeros(7))
-            return
-        since, q_then, v_then = self._mark
-        window = (utime - since) / 1e6
-        if window < _WINDOW:
-            return
-        uncertain = self._config.jitter / window
-        v = (q - q_then) / window
-        if (np.abs(v) > PANDA_LIMITS.velocity * (1 + uncertain)).any():
-            return self.enter_reflex("joint_motion_generator_velocity_limits_violation")
-        # Mean speeds of two windows are as far apart as the middles of the windows.
-        most = PANDA_LIMITS.acceleration * (window + self._config.jitter) + 2 * uncertain * np.abs(v) + 0.02
-        if (np.abs(v - v_then) > most).any():
-            return self.enter_reflex("joint_motion_generator_acceleration_discontinuity")
-        self._mark = (utime, q, v)
+    def _velocity_break(self, v: NDArray, gap: float) -> str:
+        """What is wrong with a velocity [7] that comes `gap` s after the last; "" if nothing is."""
+        if (np.abs(v) > PANDA_LIMITS.velocity).any():
+            return "velocity_limits_violation"
+        most = PANDA_LIMITS.acceleration * (min(gap, _LONGEST_PREDICTION) + self._config.jitter)
+        jump = np.abs(v - self._target) > most + 20 * self._config.step
+        return "acceleration_discontinuity" if jump.any() else ""
+
+    def _position_break(self, q: NDArray, gap: float) -> str:
+        """What is wrong with a position [7] that comes `gap` s after the last; "" if nothing is."""
+        jitter = self._config.jitter
+        q1, q2, q3, q4 = (self._planned_before(age) for age in (0, _WINDOW, 2 * _WINDOW, _LONG_WINDOW))
+        v, v_earlier = (q1 - q2) / _WINDOW, (q2 - q3) / _WINDOW
+        change = np.abs(v - v_earlier)
+        forgiven = (
+            PANDA_LIMITS.acceleration * min(gap, _LONGEST_PREDICTION) ** 2
+            + change * gap  # the mean speed of a window lags behind while it grows
+            + 2 * jitter * np.abs(v)
+            + self._config.step
+        )
+        if (np.abs(q - q1 - v * gap) > forgiven).any():
+            return "velocity_discontinuity"
+        if not PANDA_LIMITS.contains(q):
+            return "position_limits_violation"
+        most = PANDA_LIMITS.acceleration * (_WINDOW + jitter) + 2 * jitter / _WINDOW * np.abs(v) + 0.02
+        if (change > most).any():
+            return "acceleration_discontinuity"
+        if (np.abs(q1 - q4) > PANDA_LIMITS.velocity * (_LONG_WINDOW + 2 * jitter)).any():
+            return "velocity_limits_violation"
+        return ""
+
+    def _planned_before(self, age: float) -> NDArray:
+        """Where the stream was `age` s before its last command, [7]."""
+        when = self._stream[-1][0] - 1e6 * age
+        later = self._stream[-1]
+        for earlier in reversed(self._stream[:-1]):
+            if earlier[0] <= when:
+                share = (when - earlier[0]) / (later[0] - earlier[0])
+                return earlier[1] + share * (later[1] - earlier[1])
+            later = earlier
+        return later[1]
 
 
 def _limited(dv: NDArray) -> NDArray:
