@@ -10,7 +10,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -27,7 +27,7 @@ from riseg_drake.stations.emulated_drivers import CameraSide, Moment, PandaSide
 from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm, receive_buffer_warning
 from riseg_drake.stations.misbehaviour import CONTROL_CHANNEL, WORDS, WordError, parse_word
 
-_GIVE_WAY = 5  # niceness of the camera's process: pictures can wait, the arm's status cannot
+_GIVE_WAY = 2  # niceness of the camera's process: the status comes first, but pictures must not starve
 _LONGEST_WAIT = 0.05  # s, until the camera's process listens for words again
 
 
@@ -134,10 +134,10 @@ def _draw(commands: Connection, scenario_file: Path | None, seed: int) -> None:
     side = CameraSide(
         open_lcm(scenario.emulator.lcm), scenario.emulator, EmulatedCamera(scenario.station, seed), seed
     )
-    commands.send("ready")
     gc.collect()
     gc.freeze()
-    try:
+    with suppress(EOFError, BrokenPipeError):  # where the other process is gone
+        commands.send("ready")
         while True:
             wait = side.flush(time()) - time()
             if not commands.poll(max(0.0, min(wait, _LONGEST_WAIT))):
@@ -149,8 +149,6 @@ def _draw(commands: Connection, scenario_file: Path | None, seed: int) -> None:
                 break
             side.show(moment, time())
         commands.send(side.published)
-    except EOFError:  # the other process is gone
-        return
 
 
 def _pass_on(config: LcmConfig, console: Console) -> None:
