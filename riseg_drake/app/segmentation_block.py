@@ -37,25 +37,37 @@ class SegmentationBlock:
 
     stages: list[LeafSystem]
     inputs: dict[str, InputPort]
-    """The keys of STATION_PORTS."""
+    """Those of FrameView: the keys of STATION_PORTS where all follows from the joint angles."""
     outputs: dict[str, OutputPort]
     """`pair`, `above_table`, `expected_flow`, `optical_flow`, `groups`, `mask`, `settled_mask`,
     `segmentation`."""
 
 
+def panda_view(scenario: Scenario, kinematics: PandaKinematics) -> FrameView:
+    """What the scenario's camera on the arm sees: its pose and the robot's pixels follow from theta."""
+    intrinsics = scenario.station.camera.intrinsics
+    return FrameView(intrinsics, kinematics.X_WC, RobotSilhouette(kinematics, intrinsics).mask)
+
+
 def add_segmentation(
     builder: DiagramBuilder, scenario: Scenario, kinematics: PandaKinematics, seed: int
 ) -> SegmentationBlock:
-    """Add Alg. 2 to a builder, for the camera that the scenario describes."""
-    intrinsics, period = scenario.station.camera.intrinsics, 1 / scenario.station.camera.rate
-    silhouette = RobotSilhouette(kinematics, intrinsics)
-    view = builder.AddSystem(FrameView(intrinsics, kinematics.X_WC, silhouette.mask))
+    """Add Alg. 2 to a builder, for the camera on the arm that the scenario describes."""
+    view = panda_view(scenario, kinematics)
+    return add_stages(builder, scenario, view, 1 / scenario.station.camera.rate, seed)
+
+
+def add_stages(
+    builder: DiagramBuilder, scenario: Scenario, view: FrameView, period: float, seed: int
+) -> SegmentationBlock:
+    """Add Alg. 2 to a builder, for any camera; it gives an image every `period` s."""
+    builder.AddSystem(view)
     above = builder.AddSystem(ObjectsAboveTable(scenario.above_table))
     memory = builder.AddSystem(FramePairMemory(period, FRAME_OFFSET, scenario.frame_pair))
     expected = builder.AddSystem(ExpectedFlow())
     optical = builder.AddSystem(OpticalFlow(DisFlow(scenario.optical_flow)))
     grouper = builder.AddSystem(BFIFGrouper(scenario.bfif, seed))
-    propagator = builder.AddSystem(MaskPropagator(intrinsics, period, MASK_OFFSET, scenario.segment))
+    propagator = builder.AddSystem(MaskPropagator(view.intrinsics, period, MASK_OFFSET, scenario.segment))
 
     def wire(source: LeafSystem, name: str, *targets: LeafSystem, port: str | None = None) -> None:
         for target in targets:
@@ -84,17 +96,17 @@ def add_segmentation(
     }
     return SegmentationBlock(
         stages=[view, above, memory, expected, optical, grouper, propagator],
-        inputs={name: view.GetInputPort(name) for name in STATION_PORTS},
+        inputs={port.get_name(): port for port in map(view.get_input_port, range(view.num_input_ports()))},
         outputs={name: system.GetOutputPort(name) for name, system in outputs.items()},
     )
 
 
 def make_segmentation(
-    scenario: Scenario, kinematics: PandaKinematics, seed: int
+    scenario: Scenario, view: FrameView, period: float, seed: int
 ) -> tuple[Diagram, list[LeafSystem]]:
     """Alg. 2 as a diagram of its own, its ports named as the block's; and its stages."""
     builder = DiagramBuilder()
-    block = add_segmentation(builder, scenario, kinematics, seed)
+    block = add_stages(builder, scenario, view, period, seed)
     for name, input_port in block.inputs.items():
         builder.ExportInput(input_port, name)
     for name, output_port in block.outputs.items():

@@ -12,6 +12,10 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.camera import Intrinsics
 
 
+class NoPlaneError(ValueError):
+    """Why an image shows no table top, in one line."""
+
+
 @dataclass
 class PlaneFitParameters:
     """How to look for the table top. The paper says only that it is found by RANSAC (Alg. 3, line 1)."""
@@ -58,7 +62,7 @@ def fit_plane(
         plane_C [4]; the camera's centre has a positive height.
 
     Raises:
-        ValueError: where the image shows no such plane.
+        NoPlaneError: where the image shows no such plane.
     """
     parameters = parameters or PlaneFitParameters()
     p_CQ, tolerance = _sample(depth, intrinsics, rng, parameters, valid)
@@ -68,7 +72,7 @@ def fit_plane(
         prior = np.asarray(prior_normal_C, float) / np.linalg.norm(prior_normal_C)
         planes = planes[planes[:, :3] @ prior >= np.cos(parameters.prior_angle)]
     if not len(planes):
-        raise ValueError("no plane: all triplets drawn lie on a line or face away from the prior")
+        raise NoPlaneError("no plane: all triplets drawn lie on a line or face away from the prior")
 
     heights = planes[:, :3] @ p_CQ[:scoring].T + planes[:, 3:]
     on = np.count_nonzero(np.abs(heights) <= tolerance[:scoring], axis=1)
@@ -83,7 +87,7 @@ def fit_plane(
 
     share = np.mean(np.abs(p_CQ @ plane_C[:3] + plane_C[3]) <= tolerance)
     if share < parameters.minimum_share:
-        raise ValueError(
+        raise NoPlaneError(
             f"no plane: the best one holds {share:.0%} of the points with depth, "
             f"a table top should hold at least {parameters.minimum_share:.0%}"
         )
@@ -122,7 +126,7 @@ def _sample(
     usable = depth > 0 if valid is None else (depth > 0) & valid
     index = np.flatnonzero(usable)
     if len(index) < 3:
-        raise ValueError(f"no plane: {len(index)} pixels with depth, at least 3 are needed")
+        raise NoPlaneError(f"no plane: {len(index)} pixels with depth, at least 3 are needed")
     # With replacement: a hundred times faster than without, and a rare twin does no harm.
     index = rng.choice(index, parameters.points)
     v, u = np.divmod(index, intrinsics.width)

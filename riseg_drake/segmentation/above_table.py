@@ -57,7 +57,7 @@ def objects_above_table(frame: Frame, parameters: AboveTableParameters) -> Above
     answer, whoever asks and however often.
 
     Raises:
-        ValueError: where no table is to be seen.
+        NoPlaneError: where no table is to be seen.
     """
     rng = np.random.default_rng(0)
     seen = ~frame.robot

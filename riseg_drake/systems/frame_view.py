@@ -16,9 +16,12 @@ from riseg_drake.systems.stage_clock import timed
 class FrameView(LeafSystem):
     """Colour, depth, time and theta_t of one moment, put together.
 
+    Where the camera is and what the robot covers follows from theta_t, or is said by whoever knows it.
+
     Input ports:
         color_image (ImageRgba8U), depth_image (ImageDepth32F, m, aligned to colour),
-        image_time (1, s), position (joint angles theta_t, rad).
+        image_time (1, s), position (joint angles theta_t, rad; if anything follows from them),
+        camera_pose (X_WC [4, 4]; without `X_WC`), robot_pixels ([H, W] bool; without `robot_mask`).
     Output port:
         frame (Frame, `sequence` 0: who stores frames counts them), None while there is no image.
     """
@@ -26,24 +29,38 @@ class FrameView(LeafSystem):
     def __init__(
         self,
         intrinsics: Intrinsics,
-        X_WC: Callable[[NDArray], NDArray],
-        robot_mask: Callable[[NDArray], NDArray],
+        X_WC: Callable[[NDArray], NDArray] | None,
+        robot_mask: Callable[[NDArray], NDArray] | None,
         num_positions: int = 7,
     ) -> None:
-        """`X_WC` and `robot_mask` give the camera's pose and the robot's own pixels at theta."""
+        """`X_WC` and `robot_mask` give the camera's pose and the robot's own pixels at theta.
+
+        Where one of them is None, an input port stands in for it.
+        """
         super().__init__()
         self.set_name("FrameView")
         self._intrinsics, self._X_WC, self._robot_mask = intrinsics, X_WC, robot_mask
         self._color = self.DeclareAbstractInputPort("color_image", AbstractValue.Make(ImageRgba8U()))
         self._depth = self.DeclareAbstractInputPort("depth_image", AbstractValue.Make(ImageDepth32F()))
         self._time = self.DeclareVectorInputPort("image_time", 1)
-        self._position = self.DeclareVectorInputPort("position", num_positions)
+        if X_WC is not None or robot_mask is not None:
+            self._position = self.DeclareVectorInputPort("position", num_positions)
+        self._camera_pose = self._robot_pixels = None
+        if X_WC is None:
+            self._camera_pose = self.DeclareAbstractInputPort("camera_pose", AbstractValue.Make(object()))
+        if robot_mask is None:
+            self._robot_pixels = self.DeclareAbstractInputPort("robot_pixels", AbstractValue.Make(object()))
         self.DeclareAbstractOutputPort(
             "frame",
             lambda: AbstractValue.Make(object()),
             self._calc_frame,
             prerequisites_of_calc={self.all_input_ports_ticket()},
         )
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """Of the camera whose images come in."""
+        return self._intrinsics
 
     @timed
     def _calc_frame(self, context: Context, output: AbstractValue) -> None:
@@ -56,7 +73,13 @@ class FrameView(LeafSystem):
                 f"images of {color.width()}x{color.height()} (colour) and {depth.width()}x{depth.height()} "
                 f"(depth), but the intrinsics are for {self._intrinsics.width}x{self._intrinsics.height}"
             )
-        q = self._position.Eval(context)
+        X_WC, robot = (
+            port.Eval(context) if of_position is None else of_position(self._position.Eval(context))
+            for of_position, port in (
+                (self._X_WC, self._camera_pose),
+                (self._robot_mask, self._robot_pixels),
+            )
+        )
         output.set_value(
             Frame(
                 sequence=0,
@@ -64,7 +87,7 @@ class FrameView(LeafSystem):
                 intrinsics=self._intrinsics,
                 color=np.ascontiguousarray(color.data[..., :3]),
                 depth=sanitize_depth(depth.data[..., 0]),
-                X_WC=self._X_WC(q),
-                robot=self._robot_mask(q),
+                X_WC=X_WC,
+                robot=robot,
             )
         )
