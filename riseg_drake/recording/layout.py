@@ -25,6 +25,7 @@ DEPTH_LIST = "depth.txt"
 POSE_LIST = "groundtruth.txt"
 CAMERA_FILE = "camera.json"
 JOINT_LIST = "joints.csv"
+CAMERA_KEYS = "width, height, fx, fy, cx, cy, depth_scale"
 SCENARIO_FILE = "scenario.yaml"
 RUN_FILE = "run.json"
 COLOR_FOLDER = "rgb"
@@ -98,13 +99,13 @@ def camera_from_json(content: Any) -> tuple[Intrinsics, float]:
 
     Raises RecordingError, without the file's name, for what cannot be.
     """
-    keys = ("width", "height", "fx", "fy", "cx", "cy", "depth_scale")
+    keys = CAMERA_KEYS.split(", ")
     if not isinstance(content, dict):
-        raise RecordingError(f"it must hold one object with the keys {', '.join(keys)}")
+        raise RecordingError(f"it must hold one object with the keys {CAMERA_KEYS}")
     for key in keys:
         value = content.get(key)
         if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e9:
-            raise RecordingError(f'"{key}" must be a number; the keys are {", ".join(keys)}')
+            raise RecordingError(f'"{key}" must be a number; the keys are {CAMERA_KEYS}')
     for key in ("width", "height"):
         if content[key] % 1 or not SMALLEST <= content[key] <= LARGEST:
             raise RecordingError(

@@ -132,15 +132,15 @@ class RecordingReader:
             for name in missing:
                 lonely[name] += 1
             if missing:
-                far = f"{missing[0]} has nothing within {limit:g} s, the nearest is {apart[missing[0]]:.3g} s away"
-                self.leave_out(entry, far)
+                seconds = apart[missing[0]]
+                self.leave_out(entry, f"{missing[0]} has nothing nearer than {seconds:.3g} s in time")
             else:
                 frames.append((entry, depth[nearest_time(stamps[layout.DEPTH_LIST], entry.time)]))
         if not frames:
             name = max(lonely, key=lambda n: lonely[n])
             raise RecordingError(
-                f"{self._color_list}: line {color[0].line}: no stamp has a partner in {name} within {limit:g} s; "
-                "compare the stamps, or allow more with --stamp-limit"
+                f"{self._color_list}: line {color[0].line}: neither this stamp nor any other has a partner in {name} "
+                f"within {limit:g} s; compare the stamps, or allow more with --stamp-limit"
             )
         return frames
 

@@ -118,9 +118,9 @@ def _in_order(
     back = np.flatnonzero(np.concatenate([[False], times[1:] < newest[:-1]]))
     if len(back) > FEW * len(times):
         k = back[0]
+        before, after = float(newest[k - 1]), float(times[k])
         raise RecordingError(
-            f"{path}: line {lines[k]}: time runs backwards from {float(newest[k - 1])!r} to {float(times[k])!r} s; "
-            "stamps must rise"
+            f"{path}: line {lines[k]}: time runs backwards from {before!r} to {after!r} s; stamps must rise"
         )
     if len(times) > 2 and np.count_nonzero(newer) == 1:
         raise RecordingError(f"{path}: line {lines[1]}: all stamps are equal; stamps must rise")

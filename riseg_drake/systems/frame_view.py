@@ -45,11 +45,10 @@ class FrameView(LeafSystem):
         self._time = self.DeclareVectorInputPort("image_time", 1)
         if X_WC is not None or robot_mask is not None:
             self._position = self.DeclareVectorInputPort("position", num_positions)
-        self._camera_pose = self._robot_pixels = None
         if X_WC is None:
-            self._camera_pose = self.DeclareAbstractInputPort("camera_pose", AbstractValue.Make(object()))
+            self.DeclareAbstractInputPort("camera_pose", AbstractValue.Make(object()))
         if robot_mask is None:
-            self._robot_pixels = self.DeclareAbstractInputPort("robot_pixels", AbstractValue.Make(object()))
+            self.DeclareAbstractInputPort("robot_pixels", AbstractValue.Make(object()))
         self.DeclareAbstractOutputPort(
             "frame",
             lambda: AbstractValue.Make(object()),
@@ -61,6 +60,9 @@ class FrameView(LeafSystem):
     def intrinsics(self) -> Intrinsics:
         """Of the camera whose images come in."""
         return self._intrinsics
+
+    def _q(self, context: Context) -> NDArray[np.float64]:
+        return self._position.Eval(context)
 
     @timed
     def _calc_frame(self, context: Context, output: AbstractValue) -> None:
@@ -74,11 +76,8 @@ class FrameView(LeafSystem):
                 f"(depth), but the intrinsics are for {self._intrinsics.width}x{self._intrinsics.height}"
             )
         X_WC, robot = (
-            port.Eval(context) if of_position is None else of_position(self._position.Eval(context))
-            for of_position, port in (
-                (self._X_WC, self._camera_pose),
-                (self._robot_mask, self._robot_pixels),
-            )
+            self.GetInputPort(name).Eval(context) if of_position is None else of_position(self._q(context))
+            for of_position, name in ((self._X_WC, "camera_pose"), (self._robot_mask, "robot_pixels"))
         )
         output.set_value(
             Frame(
