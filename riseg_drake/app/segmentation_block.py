@@ -9,6 +9,7 @@ from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.robot.silhouette import RobotSilhouette
 from riseg_drake.segmentation.optical_flow import DisFlow
 from riseg_drake.systems.bfif_grouper import BFIFGrouper
+from riseg_drake.systems.camera_motion import CameraMotion
 from riseg_drake.systems.expected_flow import ExpectedFlow
 from riseg_drake.systems.frame_pair import FramePairMemory
 from riseg_drake.systems.frame_view import FrameView
@@ -63,9 +64,12 @@ def add_stages(
     """Add Alg. 2 to a builder, for any camera; it gives an image every `period` s."""
     builder.AddSystem(view)
     above = builder.AddSystem(ObjectsAboveTable(scenario.above_table))
-    memory = builder.AddSystem(FramePairMemory(period, FRAME_OFFSET, scenario.frame_pair))
+    memory = builder.AddSystem(
+        FramePairMemory(period, FRAME_OFFSET, scenario.frame_pair, scenario.camera_motion)
+    )
     expected = builder.AddSystem(ExpectedFlow())
     optical = builder.AddSystem(OpticalFlow(DisFlow(scenario.optical_flow)))
+    motion = builder.AddSystem(CameraMotion(scenario.camera_motion, scenario.bfif.noise))
     grouper = builder.AddSystem(BFIFGrouper(scenario.bfif, seed))
     propagator = builder.AddSystem(MaskPropagator(view.intrinsics, period, MASK_OFFSET, scenario.segment))
 
@@ -75,7 +79,12 @@ def add_stages(
 
     wire(view, "frame", above, memory)
     wire(above, "above_table", memory)
-    wire(memory, "pair", expected, optical, grouper, propagator)
+    wire(memory, "pair", optical, motion)
+    wire(optical, "optical_flow", motion)
+    wire(memory, "above_table_reference", motion)
+    wire(memory, "above_table", motion)
+    wire(memory, "pose_error", motion)
+    wire(motion, "pair", expected, grouper, propagator)
     wire(expected, "expected_flow", grouper, propagator)  # lines 1
     wire(optical, "optical_flow", grouper, propagator)  # and 2
     wire(memory, "above_table_reference", grouper, port="above_table")
@@ -95,7 +104,7 @@ def add_stages(
         "segmentation": propagator,
     }
     return SegmentationBlock(
-        stages=[view, above, memory, expected, optical, grouper, propagator],
+        stages=[view, above, memory, motion, expected, optical, grouper, propagator],
         inputs={port.get_name(): port for port in map(view.get_input_port, range(view.num_input_ports()))},
         outputs={name: system.GetOutputPort(name) for name, system in outputs.items()},
     )

@@ -139,8 +139,8 @@ class RecordingReader:
         if not frames:
             name = max(lonely, key=lambda n: lonely[n])
             raise RecordingError(
-                f"{self._color_list}: line {color[0].line}: neither this stamp nor any other has a partner in {name} "
-                f"within {limit:g} s; compare the stamps, or allow more with --stamp-limit"
+                f"{self._color_list}: line {color[0].line}: neither this stamp nor any other has a partner "
+                f"in {name} within {limit:g} s; compare the stamps, or allow more with --stamp-limit"
             )
         return frames
 
