@@ -10,6 +10,7 @@ expected and observed flow is the noise above which something moves.
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
@@ -23,9 +24,11 @@ from riseg_drake.segmentation.noise import MeasurementNoise, flow_sigma, smooth_
 
 _PLANE_TILT_SIGMA, _PLANE_HEIGHT_SIGMA = 5e-4, 3e-4
 """Standard deviations of a fitted table's tilt, rad, and height, m."""
+_RIM = np.ones((21, 21), np.uint8)
+"""So far from an outline, in pixels, flow of one side leaks to the other."""
 _CORRELATED = 9.0
 """Points of flow sampled a dozen pixels apart that are worth one."""
-_FIT_ROUNDS = 8
+_FIT_ROUNDS, _HYPOTHESES, _VOTERS = 5, 128, 500
 
 
 @dataclass
@@ -161,7 +164,8 @@ def _points(
     v, u = np.mgrid[: intrinsics.height, : intrinsics.width][(slice(None), *every)]
     uv_1 = np.stack([u, v], axis=-1) + optical_flow[every].astype(float)
     inside = (uv_1 >= 0).all(-1) & (uv_1[..., 0] < intrinsics.width) & (uv_1[..., 1] < intrinsics.height)
-    good = inside & (depth > 0) & ~reference.robot[every] & (sigma < 2 * noise.flow)
+    rim = cv2.morphologyEx(above_0.mask.astype(np.uint8), cv2.MORPH_GRADIENT, _RIM)[every] > 0
+    good = ~rim & inside & (depth > 0) & ~reference.robot[every] & (sigma < 2 * noise.flow)
     p_C0Q = (rays(intrinsics)[every] * depth[..., None])[good].astype(float)
     return p_C0Q, sigma[good].astype(float), ~above_0.mask[every][good], uv_1[good]
 
@@ -176,7 +180,6 @@ def _fit(
     parameters: CameraMotionParameters,
 ) -> NDArray[np.float64]:
     """The small motion [6] of C1 by which most points, and the table, agree with the images."""
-    k = pair.current.intrinsics
     tilt, height, p_C1T, plane_C1 = change
     sigma_V = np.repeat(np.maximum(sigma, (1e-5, 1e-5)), 3)
     normal_0 = np.diag(sigma_V**-2.0)
@@ -187,25 +190,50 @@ def _fit(
         along = np.hstack([np.cross(p_C1T, n), n]) / _PLANE_HEIGHT_SIGMA
         normal_0 += across.T @ across + np.outer(along, along)
         rhs_0 += across.T @ (tilt / _PLANE_TILT_SIGMA) - along * (height / _PLANE_HEIGHT_SIGMA)
-    # A wide kernel first, so that it does not matter where the fit begins: at rest, errors of poses and all.
-    widest = max(4.0, parameters.reach * k.fx * np.hypot(sigma[0], sigma[1] / np.median(p_C0Q[:, 2])))
-    widths = np.geomspace(widest, 1.0, _FIT_ROUNDS)
-    V = np.zeros(6)
-    for width in widths:
-        p = move_points(exp_se3(V) @ pair.X_C1C0, p_C0Q)
-        apart = uv_1 - project(p, k)
-        scale = width * np.maximum(flow_noise, 0.2) * 3
+    V = _consensus(*_linearised(np.zeros(6), p_C0Q, uv_1, pair), flow_noise, normal_0, rhs_0)
+    for _ in range(_FIT_ROUNDS):
+        apart, J = _linearised(V, p_C0Q, uv_1, pair)
         squared = (apart**2).sum(1)
-        weight = 1 / (1 + squared / scale**2) ** 2 / (_CORRELATED * flow_noise**2)
-        weight[~np.isfinite(squared)] = 0
-        apart = np.nan_to_num(apart)
-        per_z = 1 / np.maximum(p[:, 2], 1e-3)
-        d_uv = np.zeros((len(p), 2, 3))
-        d_uv[:, 0, 0], d_uv[:, 0, 2] = k.fx * per_z, -k.fx * p[:, 0] * per_z**2
-        d_uv[:, 1, 1], d_uv[:, 1, 2] = k.fy * per_z, -k.fy * p[:, 1] * per_z**2
-        J = np.concatenate([d_uv @ -skew(p), d_uv], axis=-1)
+        weight = 1 / (1 + squared / (3 * flow_noise) ** 2) ** 2 / (_CORRELATED * flow_noise**2)
         JW = J * weight[:, None, None]
         normal = np.einsum("nki,nkj->ij", JW, J) + normal_0
         rhs = np.einsum("nki,nk->i", JW, apart + np.einsum("nki,i->nk", J, V)) + rhs_0
         V = np.linalg.solve(normal, rhs)
     return V / max(1.0, float(np.abs(V / (parameters.reach * sigma_V)).max()))
+
+
+def _consensus(
+    apart: NDArray, J: NDArray, flow_noise: NDArray, normal_0: NDArray, rhs_0: NDArray
+) -> NDArray[np.float64]:
+    """Of the motions [6] that a few random points each give, the one that the most points agree with.
+
+    What moves alike may be a large part of all that has texture: no average tells it from the rest.
+    """
+    rng = np.random.default_rng(0)
+    few = rng.integers(len(apart), size=(_HYPOTHESES, 4))
+    J_few = J[few].reshape(_HYPOTHESES, 8, 6) / flow_noise[few].repeat(2, axis=1)[..., None]
+    apart_few = apart[few].reshape(_HYPOTHESES, 8) / flow_noise[few].repeat(2, axis=1)
+    normal = J_few.swapaxes(1, 2) @ J_few + normal_0
+    rhs = np.einsum("hki,hk->hi", J_few, apart_few) + rhs_0
+    V = np.linalg.solve(normal, rhs[..., None])[..., 0]
+    asked = rng.integers(len(apart), size=_VOTERS)
+    left = apart[asked] - np.einsum("nki,hi->hnk", J[asked], V)
+    cost = np.minimum((left**2).sum(-1) / (3 * flow_noise[asked]) ** 2, 1.0).sum(1)
+    unlikely = np.einsum("hi,ij,hj->h", V, normal_0, V) - 2 * V @ rhs_0
+    return V[np.argmin(cost * (len(apart) / _CORRELATED / _VOTERS) + 0.5 * unlikely)]
+
+
+def _linearised(
+    V: NDArray, p_C0Q: NDArray, uv_1: NDArray, pair: FramePair
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """By how many pixels [N, 2] points appear elsewhere than C1 moved by V has them, and how V changes that."""
+    k = pair.current.intrinsics
+    p = move_points(exp_se3(V) @ pair.X_C1C0, p_C0Q)
+    per_z = 1 / np.maximum(p[:, 2], 1e-3)
+    d_uv = np.zeros((len(p), 2, 3))
+    d_uv[:, 0, 0], d_uv[:, 0, 2] = k.fx * per_z, -k.fx * p[:, 0] * per_z**2
+    d_uv[:, 1, 1], d_uv[:, 1, 2] = k.fy * per_z, -k.fy * p[:, 1] * per_z**2
+    apart = uv_1 - project(p, k)
+    lost = ~np.isfinite(apart).all(1)
+    apart[lost], d_uv[lost] = 1e3, 0  # behind the camera: as wrong as can be
+    return apart, np.concatenate([d_uv @ -skew(p), d_uv], axis=-1)
