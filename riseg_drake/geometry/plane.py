@@ -33,6 +33,8 @@ class PlaneFitParameters:
     below_penalty: float = 0.5
     """What a point below the plane costs, in points on it. Things stand on a table and nothing is under
     it, so the top of a big box loses against the table that shows beside it."""
+    near: float = 1.5
+    """What is farther away than so many times the nearest fifth counts less, by the square of depth."""
     minimum_share: float = 0.15
     """Share of the valid points that a plane must hold to be believed."""
     prior_angle: float = 0.35
@@ -75,9 +77,11 @@ def fit_plane(
         raise NoPlaneError("no plane: all triplets drawn lie on a line or face away from the prior")
 
     heights = planes[:, :3] @ p_CQ[:scoring].T + planes[:, 3:]
-    on = np.count_nonzero(np.abs(heights) <= tolerance[:scoring], axis=1)
-    below = np.count_nonzero(heights < -tolerance[:scoring], axis=1)
-    plane_C = planes[np.argmax(on - parameters.below_penalty * below)]
+    # What is near counts more: a table seen from beside may show less of itself than of floor and wall.
+    z = p_CQ[:scoring, 2]
+    nearness = np.minimum(1.0, np.square(parameters.near * np.quantile(z, 0.2) / z))
+    on, below = np.abs(heights) <= tolerance[:scoring], heights < -tolerance[:scoring]
+    plane_C = planes[np.argmax((on - parameters.below_penalty * below) @ nearness)]
 
     for _ in range(2):
         inlier = np.abs(p_CQ @ plane_C[:3] + plane_C[3]) <= tolerance

@@ -16,6 +16,7 @@ from riseg_drake.geometry.plane import (
     transform_plane,
 )
 from riseg_drake.geometry.rgbd import Frame, Immutable
+from riseg_drake.segmentation.table_extent import off_table
 
 _COLOR_SPREAD_MIN = 4.0
 """Gray levels; a table's colour is not known better than that."""
@@ -71,6 +72,9 @@ def objects_above_table(frame: Frame, parameters: AboveTableParameters) -> Above
     )
     with np.errstate(invalid="ignore"):
         mask = (height > low) & seen
+    elsewhere = off_table(frame, height, plane_C, on_table, parameters.height_min)
+    if elsewhere is not None:
+        mask &= ~elsewhere
     mask = _without_specks(mask, frame, on_table, parameters.area_min)
     return AboveTable(mask, height, transform_plane(frame.X_WC, plane_C), depth_noise)
 
