@@ -42,8 +42,15 @@ class Replay:
         context = self._simulator.get_mutable_context()
         _fix_inputs(self._diagram, context, frame)
         # Before the camera's next tick each stage has done its work for this one.
-        self._simulator.AdvanceTo((self._ticks + 0.5) * PERIOD)
         self._ticks += 1
+        half_way = (self._ticks - 0.5) * PERIOD
+        try:
+            self._simulator.AdvanceTo(half_way)
+        except ValueError:
+            # Nothing was taken in: go on as if this tick had brought no frame.
+            context.SetTime(half_way)
+            self._simulator.Initialize()
+            raise
         return self._diagram.GetOutputPort("mask").Eval(context)
 
     @property

@@ -73,10 +73,12 @@ def _feet(ray: NDArray, depth: NDArray, along: NDArray) -> NDArray[np.float32]:
 
 def _largest_piece(on_table: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """The largest connected part; objects between do not part it."""
-    closed = cv2.morphologyEx(on_table.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((7, 7), np.uint8))
+    # A wall meets the plane in a thin strip, which is none of the table.
+    broad = cv2.morphologyEx(on_table.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    closed = cv2.morphologyEx(broad, cv2.MORPH_CLOSE, np.ones((7, 7), np.uint8))
     _, label, stats, _ = cv2.connectedComponentsWithStats(closed)
     stats[0, cv2.CC_STAT_AREA] = 0
-    return on_table & (label == np.argmax(stats[:, cv2.CC_STAT_AREA]))
+    return (broad > 0) & (label == np.argmax(stats[:, cv2.CC_STAT_AREA]))
 
 
 def _map(feet: NDArray, origin: NDArray) -> NDArray[np.uint8]:
