@@ -43,8 +43,10 @@ class CameraMotionParameters:
     """The error is the upper end of what the table shows with that confidence."""
     reach: float = 4.0
     """Standard deviations of the poses' error by which the motion may be set right at most."""
-    other_plane: tuple[float, float] = (0.09, 0.03)
-    """rad and m; where the table differs by more between two frames, it is another one."""
+    tilt_max: float = 0.09
+    """rad; where the table tilts by more between two frames, it is another plane."""
+    height_max: float = 0.03
+    """m; where it rises or sinks by more, too."""
     points: int = 4000
     """Pixels that are asked."""
 
@@ -99,7 +101,7 @@ def renewed_pose_error(
     if np.array_equal(before.X_WC, after.X_WC):
         return known  # a camera that stands still says nothing about how it moves
     tilt, height, _, _ = table_change(before, above_0.plane_W, after, above_1.plane_W)
-    if np.linalg.norm(tilt) > parameters.other_plane[0] or abs(height) > parameters.other_plane[1]:
+    if np.linalg.norm(tilt) > parameters.tilt_max or abs(height) > parameters.height_max:
         return known
     kept = max(0.0, 1 - 1 / parameters.frames)
     return PoseError(
@@ -184,7 +186,7 @@ def _fit(
     sigma_V = np.repeat(np.maximum(sigma, (1e-5, 1e-5)), 3)
     normal_0 = np.diag(sigma_V**-2.0)
     rhs_0 = np.zeros(6)
-    if np.linalg.norm(tilt) < parameters.other_plane[0] and abs(height) < parameters.other_plane[1]:
+    if np.linalg.norm(tilt) < parameters.tilt_max and abs(height) < parameters.height_max:
         n = plane_C1[:3]
         across = np.hstack([np.eye(3) - np.outer(n, n), np.zeros((3, 3))]) / _PLANE_TILT_SIGMA
         along = np.hstack([np.cross(p_C1T, n), n]) / _PLANE_HEIGHT_SIGMA
