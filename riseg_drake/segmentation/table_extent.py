@@ -19,6 +19,8 @@ _REACH = 3.0
 """m; the map is cut off that far from the table's middle."""
 _ELSEWHERE_SHARE = 0.03
 """Share of the image that must be far from the table before its end matters at all."""
+_BROAD_SHARE = 0.7
+"""Of what lies on the plane; where less than that is broad, the table is full of things."""
 _FAR, _MARGIN = 0.03, 0.008
 """m beside the seen table: that far is surely elsewhere; so near is still on it."""
 
@@ -73,8 +75,10 @@ def _feet(ray: NDArray, depth: NDArray, along: NDArray) -> NDArray[np.float32]:
 
 def _largest_piece(on_table: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """The largest connected part; objects between do not part it."""
-    # A wall meets the plane in a thin strip, which is none of the table.
+    # A wall meets the plane in a thin strip, which is none of the table; but a full table has thin gaps.
     broad = cv2.morphologyEx(on_table.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    if np.count_nonzero(broad) < _BROAD_SHARE * np.count_nonzero(on_table):
+        broad = on_table.astype(np.uint8)
     closed = cv2.morphologyEx(broad, cv2.MORPH_CLOSE, np.ones((7, 7), np.uint8))
     _, label, stats, _ = cv2.connectedComponentsWithStats(closed)
     stats[0, cv2.CC_STAT_AREA] = 0

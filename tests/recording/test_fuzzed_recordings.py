@@ -10,7 +10,7 @@ from tests.recording.fuzzed import SETTINGS, camera, check, edits
 def test_a_mutated_recording_gives_masks_or_one_line(whole, tmp_path_factory, changes, camera_changes):
     check(
         whole,
-        tmp_path_factory.getbasetemp() / "a_mutated_recording_gives_masks_or_one_line",
+        tmp_path_factory.getbasetemp() / "fuzzed",
         changes,
         camera_changes,
     )
