@@ -10,6 +10,7 @@ from typing import Any
 
 from riseg_drake.app.replay import Replay
 from riseg_drake.app.scenario import Scenario
+from riseg_drake.app.segmentation_block import panda_view
 from riseg_drake.evaluation.scores import Scores, score
 from riseg_drake.recording.layout import RecordedFrame, RecordingError
 from riseg_drake.recording.reader import RecordingReader
@@ -72,7 +73,8 @@ def ablate(scenario: Scenario, seed: int, recording: Path, times: Sequence[float
     """
     kinematics = PandaKinematics(scenario.station.panda)
     replays = {
-        name: Replay(switched(scenario, switch), kinematics, seed) for name, switch in versions().items()
+        name: Replay(switched(scenario, switch), panda_view(scenario, kinematics), seed)
+        for name, switch in versions().items()
     }
     scores: dict[str, list[Scores]] = {name: [] for name in replays}
     failures: dict[str, str] = {}

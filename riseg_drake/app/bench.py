@@ -17,7 +17,7 @@ from riseg_drake.app.output import stage_figures
 from riseg_drake.app.run import peak_memory_mb
 from riseg_drake.app.scenario import Scenario, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
-from riseg_drake.app.segmentation_block import STATION_PORTS, make_segmentation
+from riseg_drake.app.segmentation_block import STATION_PORTS, make_segmentation, panda_view
 from riseg_drake.app.tables import stage_table
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pushing.push import ArmPhase
@@ -101,8 +101,8 @@ class _StageMemory(StageClock):
 def _segment(scenario: Scenario, images: Sequence[StationOutputs], clock: StageClock) -> None:
     """Put the images through Alg. 2, one tick of the camera each, and book every stage and the whole."""
     period = 1 / scenario.station.camera.rate
-    kinematics = PandaKinematics(scenario.station.panda)
-    diagram, stages = make_segmentation(scenario, kinematics, seed=0)
+    view = panda_view(scenario, PandaKinematics(scenario.station.panda))
+    diagram, stages = make_segmentation(scenario, view, period, seed=0)
     simulator = Simulator(diagram)
     context = simulator.get_mutable_context()
     for tick, now in enumerate(images):

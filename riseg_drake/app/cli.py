@@ -119,6 +119,41 @@ def _parser() -> argparse.ArgumentParser:
         "--say", metavar="WORD", help="tell a running emulator: reflex, stop, recover, 'die 2', or a fault"
     )
 
+    segment = _add(
+        commands,
+        "segment",
+        _segment,
+        "Find the objects of a recording, without a robot: masks, a video, and scores where there are labels.\n"
+        "A recording is a folder in the TUM RGB-D layout with a camera.json, see docs/recordings.md.",
+    )
+    segment.add_argument("recording", type=Path, metavar="RECORDING", help="its folder")
+    segment.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/segment_NAME)")
+    segment.add_argument(
+        "--scenario",
+        type=Path,
+        metavar="FILE",
+        help="a YAML file (the recorded run's, or the built-in one)",
+    )
+    segment.add_argument(
+        "--seed", type=_seed, metavar="N", help="draws the samples (that of the recorded run, or 0)"
+    )
+    segment.add_argument(
+        "--robot", type=Path, metavar="FILE", help="URDF or SDF of the robot that joints.csv is of (the Panda)"
+    )
+    segment.add_argument(
+        "--camera-frame",
+        default="camera",
+        metavar="NAME",
+        help="frame of that robot: x right, y down, z ahead in the image (camera)",
+    )
+    segment.add_argument(
+        "--stamp-limit",
+        type=_seconds,
+        default=0.02,
+        metavar="S",
+        help="how far apart in time what belongs together may be, s (0.02)",
+    )
+
     score = _add(
         commands,
         "score",
@@ -170,6 +205,22 @@ def _positive(text: str) -> int:
     return number
 
 
+def _seed(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 up")
+    return int(text)
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = -1.0
+    if not 0 < seconds < 1e6:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds above 0")
+    return seconds
+
+
 def _add_scenario(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "scenario",
@@ -208,6 +259,23 @@ def _emulate(chosen: argparse.Namespace, console: Console) -> None:
     emulate_command(chosen.scenario, chosen.seed, chosen.control_mode, chosen.fault, chosen.say, console)
 
 
+def _segment(chosen: argparse.Namespace, console: Console) -> None:
+    from riseg_drake.app.segment_command import SegmentRequest, segment_command
+
+    segment_command(
+        SegmentRequest(
+            recording=chosen.recording,
+            output=chosen.output,
+            scenario=chosen.scenario,
+            seed=chosen.seed,
+            robot=chosen.robot,
+            camera_frame=chosen.camera_frame,
+            stamp_limit=chosen.stamp_limit,
+        ),
+        console,
+    )
+
+
 def _score(chosen: argparse.Namespace, console: Console) -> None:
     from riseg_drake.app.score_command import score_command
 
@@ -235,6 +303,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.app.scene_pool import ClusterError
     from riseg_drake.evaluation.label_folders import LabelFolderError
     from riseg_drake.recording.layout import RecordingError
+    from riseg_drake.robot.own_robot import OwnRobotError
     from riseg_drake.stations.lcm_channels import LcmError
     from riseg_drake.stations.misbehaviour import WordError
     from riseg_drake.stations.panda_driver import DriverEndedError
@@ -247,6 +316,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
         SceneError,
         LabelFolderError,
         RecordingError,
+        OwnRobotError,
         EvaluationError,
         ClusterError,
         LcmError,

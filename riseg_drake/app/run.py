@@ -7,6 +7,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from time import perf_counter
 
+from pydrake.common.yaml import yaml_dump_typed
 from pydrake.geometry import Meshcat, StartMeshcat
 from pydrake.systems.framework import Context
 from rich.console import Console
@@ -15,11 +16,11 @@ from rich.status import Status
 from riseg_drake.app.diagram import WiredDiagram, make_diagram
 from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.interactions import Listener, Progress, interactions
-from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step, stage_figures
+from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step, stage_figures, to_json
 from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
 from riseg_drake.app.tables import score_table, stage_table
 from riseg_drake.geometry.rgbd import Frame
-from riseg_drake.recording.layout import RecordedFrame
+from riseg_drake.recording.layout import RUN_FILE, SCENARIO_FILE, RecordedFrame
 from riseg_drake.recording.whole_file import write_text
 from riseg_drake.recording.writer import RecordingWriter
 from riseg_drake.systems.stage_clock import StageClock
@@ -64,6 +65,8 @@ def run(
         listeners: list[Listener] = [lambda *_: narrator.follow(progress)]
         if record:
             writer = stack.enter_context(RecordingWriter(folder.path / RECORDING, wired.intrinsics))
+            write_text(writer.folder / SCENARIO_FILE, yaml_dump_typed(scenario))
+            write_text(writer.folder / RUN_FILE, to_json({"seed": seed}))
             listeners.append(recorder(wired, writer))
         if meshcat is not None:
             stack.enter_context(_replay(meshcat, folder.path / REPLAY))

@@ -8,6 +8,7 @@ from riseg_drake.app.scenario_file import parse_scenario, read_scenario
 from riseg_drake.pushing.push_planning import PushPlanningParameters
 from riseg_drake.segmentation.above_table import AboveTableParameters
 from riseg_drake.segmentation.bfif import BFIFParameters
+from riseg_drake.segmentation.camera_motion import CameraMotionParameters
 from riseg_drake.segmentation.frame_pairs import FramePairParameters
 from riseg_drake.segmentation.optical_flow import DisFlowParameters
 from riseg_drake.segmentation.segment import SegmentParameters
@@ -28,6 +29,8 @@ class Scenario:
     """What counts as standing on the table (Alg. 3, line 1)."""
     frame_pair: FramePairParameters = field(default_factory=FramePairParameters)
     """Which two frames are compared."""
+    camera_motion: CameraMotionParameters = field(default_factory=CameraMotionParameters)
+    """How far the camera's poses are believed."""
     optical_flow: DisFlowParameters = field(default_factory=DisFlowParameters)
     """Alg. 2, line 2."""
     bfif: BFIFParameters = field(default_factory=BFIFParameters)

@@ -9,6 +9,7 @@ from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.robot.silhouette import RobotSilhouette
 from riseg_drake.segmentation.optical_flow import DisFlow
 from riseg_drake.systems.bfif_grouper import BFIFGrouper
+from riseg_drake.systems.camera_motion import CameraMotion
 from riseg_drake.systems.expected_flow import ExpectedFlow
 from riseg_drake.systems.frame_pair import FramePairMemory
 from riseg_drake.systems.frame_view import FrameView
@@ -37,25 +38,40 @@ class SegmentationBlock:
 
     stages: list[LeafSystem]
     inputs: dict[str, InputPort]
-    """The keys of STATION_PORTS."""
+    """Those of FrameView: the keys of STATION_PORTS where all follows from the joint angles."""
     outputs: dict[str, OutputPort]
     """`pair`, `above_table`, `expected_flow`, `optical_flow`, `groups`, `mask`, `settled_mask`,
     `segmentation`."""
 
 
+def panda_view(scenario: Scenario, kinematics: PandaKinematics) -> FrameView:
+    """What the scenario's camera on the arm sees: its pose and the robot's pixels follow from theta."""
+    intrinsics = scenario.station.camera.intrinsics
+    return FrameView(intrinsics, kinematics.X_WC, RobotSilhouette(kinematics, intrinsics).mask)
+
+
 def add_segmentation(
     builder: DiagramBuilder, scenario: Scenario, kinematics: PandaKinematics, seed: int
 ) -> SegmentationBlock:
-    """Add Alg. 2 to a builder, for the camera that the scenario describes."""
-    intrinsics, period = scenario.station.camera.intrinsics, 1 / scenario.station.camera.rate
-    silhouette = RobotSilhouette(kinematics, intrinsics)
-    view = builder.AddSystem(FrameView(intrinsics, kinematics.X_WC, silhouette.mask))
+    """Add Alg. 2 to a builder, for the camera on the arm that the scenario describes."""
+    view = panda_view(scenario, kinematics)
+    return add_stages(builder, scenario, view, 1 / scenario.station.camera.rate, seed)
+
+
+def add_stages(
+    builder: DiagramBuilder, scenario: Scenario, view: FrameView, period: float, seed: int
+) -> SegmentationBlock:
+    """Add Alg. 2 to a builder, for any camera; it gives an image every `period` s."""
+    builder.AddSystem(view)
     above = builder.AddSystem(ObjectsAboveTable(scenario.above_table))
-    memory = builder.AddSystem(FramePairMemory(period, FRAME_OFFSET, scenario.frame_pair))
+    memory = builder.AddSystem(
+        FramePairMemory(period, FRAME_OFFSET, scenario.frame_pair, scenario.camera_motion)
+    )
     expected = builder.AddSystem(ExpectedFlow())
     optical = builder.AddSystem(OpticalFlow(DisFlow(scenario.optical_flow)))
+    motion = builder.AddSystem(CameraMotion(scenario.camera_motion, scenario.bfif.noise))
     grouper = builder.AddSystem(BFIFGrouper(scenario.bfif, seed))
-    propagator = builder.AddSystem(MaskPropagator(intrinsics, period, MASK_OFFSET, scenario.segment))
+    propagator = builder.AddSystem(MaskPropagator(view.intrinsics, period, MASK_OFFSET, scenario.segment))
 
     def wire(source: LeafSystem, name: str, *targets: LeafSystem, port: str | None = None) -> None:
         for target in targets:
@@ -63,7 +79,12 @@ def add_segmentation(
 
     wire(view, "frame", above, memory)
     wire(above, "above_table", memory)
-    wire(memory, "pair", expected, optical, grouper, propagator)
+    wire(memory, "pair", optical, motion)
+    wire(optical, "optical_flow", motion)
+    wire(memory, "above_table_reference", motion)
+    wire(memory, "above_table", motion)
+    wire(memory, "pose_error", motion)
+    wire(motion, "pair", expected, grouper, propagator)
     wire(expected, "expected_flow", grouper, propagator)  # lines 1
     wire(optical, "optical_flow", grouper, propagator)  # and 2
     wire(memory, "above_table_reference", optical, grouper, port="above_table")
@@ -83,18 +104,18 @@ def add_segmentation(
         "segmentation": propagator,
     }
     return SegmentationBlock(
-        stages=[view, above, memory, expected, optical, grouper, propagator],
-        inputs={name: view.GetInputPort(name) for name in STATION_PORTS},
+        stages=[view, above, memory, motion, expected, optical, grouper, propagator],
+        inputs={port.get_name(): port for port in map(view.get_input_port, range(view.num_input_ports()))},
         outputs={name: system.GetOutputPort(name) for name, system in outputs.items()},
     )
 
 
 def make_segmentation(
-    scenario: Scenario, kinematics: PandaKinematics, seed: int
+    scenario: Scenario, view: FrameView, period: float, seed: int
 ) -> tuple[Diagram, list[LeafSystem]]:
     """Alg. 2 as a diagram of its own, its ports named as the block's; and its stages."""
     builder = DiagramBuilder()
-    block = add_segmentation(builder, scenario, kinematics, seed)
+    block = add_stages(builder, scenario, view, period, seed)
     for name, input_port in block.inputs.items():
         builder.ExportInput(input_port, name)
     for name, output_port in block.outputs.items():

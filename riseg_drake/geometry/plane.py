@@ -12,6 +12,10 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.camera import Intrinsics
 
 
+class NoPlaneError(ValueError):
+    """Why an image shows no table top, in one line."""
+
+
 @dataclass
 class PlaneFitParameters:
     """How to look for the table top. The paper says only that it is found by RANSAC (Alg. 3, line 1)."""
@@ -29,6 +33,8 @@ class PlaneFitParameters:
     below_penalty: float = 0.5
     """What a point below the plane costs, in points on it. Things stand on a table and nothing is under
     it, so the top of a big box loses against the table that shows beside it."""
+    near: float = 1.5
+    """What is farther away than so many times the nearest fifth counts less, by the square of depth."""
     minimum_share: float = 0.15
     """Share of the valid points that a plane must hold to be believed."""
     prior_angle: float = 0.35
@@ -58,7 +64,7 @@ def fit_plane(
         plane_C [4]; the camera's centre has a positive height.
 
     Raises:
-        ValueError: where the image shows no such plane.
+        NoPlaneError: where the image shows no such plane.
     """
     parameters = parameters or PlaneFitParameters()
     p_CQ, tolerance = _sample(depth, intrinsics, rng, parameters, valid)
@@ -68,14 +74,17 @@ def fit_plane(
         prior = np.asarray(prior_normal_C, float) / np.linalg.norm(prior_normal_C)
         planes = planes[planes[:, :3] @ prior >= np.cos(parameters.prior_angle)]
     if not len(planes):
-        raise ValueError("no plane: all triplets drawn lie on a line or face away from the prior")
+        raise NoPlaneError("no plane: all triplets drawn lie on a line or face away from the prior")
 
+    # What is near counts more: a table seen from beside may show less of itself than of floor and wall.
+    z = p_CQ[:scoring, 2]
+    nearness = np.minimum(1.0, np.square(parameters.near * np.quantile(z, 0.2) / z)).astype(np.float32)
     heights = planes[:, :3].astype(np.float32) @ p_CQ[:scoring].T.astype(np.float32)
     heights += planes[:, 3:].astype(np.float32)
     heights /= tolerance[:scoring].astype(np.float32)
-    on = np.count_nonzero(np.abs(heights) <= 1, axis=1)
-    below = np.count_nonzero(heights < -1, axis=1)
-    plane_C = planes[np.argmax(on - parameters.below_penalty * below)]
+    on = (np.abs(heights) <= 1).astype(np.float32)
+    below = (heights < -1).astype(np.float32)
+    plane_C = planes[np.argmax(on @ nearness - parameters.below_penalty * (below @ nearness))]
 
     for _ in range(2):
         inlier = np.abs(p_CQ @ plane_C[:3] + plane_C[3]) <= tolerance
@@ -85,7 +94,7 @@ def fit_plane(
 
     share = np.mean(np.abs(p_CQ @ plane_C[:3] + plane_C[3]) <= tolerance)
     if share < parameters.minimum_share:
-        raise ValueError(
+        raise NoPlaneError(
             f"no plane: the best one holds {share:.0%} of the points with depth, "
             f"a table top should hold at least {parameters.minimum_share:.0%}"
         )
@@ -124,7 +133,7 @@ def _sample(
     usable = depth > 0 if valid is None else (depth > 0) & valid
     index = np.flatnonzero(usable)
     if len(index) < 3:
-        raise ValueError(f"no plane: {len(index)} pixels with depth, at least 3 are needed")
+        raise NoPlaneError(f"no plane: {len(index)} pixels with depth, at least 3 are needed")
     # With replacement: a hundred times faster than without, and a rare twin does no harm.
     index = rng.choice(index, parameters.points)
     v, u = np.divmod(index, intrinsics.width)

@@ -65,6 +65,8 @@ class FramePair(Immutable):
 
     reference: Frame
     current: Frame
+    residual: float = 0.0
+    """Standard deviation of O_t - E_t where nothing moves, pixels, as far as it was measured."""
 
     @property
     def X_C1C0(self) -> NDArray[np.float64]:

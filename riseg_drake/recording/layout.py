@@ -6,6 +6,7 @@
     camera.json             width, height, fx, fy, cx, cy, depth_scale (units of depth per metre)
     joints.csv              timestamp,q1..q7                   optional
     robot/, label/          PNG named as in rgb/: the robot's own pixels; object ids     optional
+    scenario.yaml, run.json what a run was told, and its seed  optional, written by `riseg run --record`
 
 Times are seconds, lengths metres, angles radians, quaternions have the scalar last.
 """
@@ -24,6 +25,9 @@ DEPTH_LIST = "depth.txt"
 POSE_LIST = "groundtruth.txt"
 CAMERA_FILE = "camera.json"
 JOINT_LIST = "joints.csv"
+CAMERA_KEYS = "width, height, fx, fy, cx, cy, depth_scale"
+SCENARIO_FILE = "scenario.yaml"
+RUN_FILE = "run.json"
 COLOR_FOLDER = "rgb"
 DEPTH_FOLDER = "depth"
 ROBOT_FOLDER = "robot"
@@ -36,12 +40,29 @@ HEADERS = {
     JOINT_LIST: "timestamp," + ",".join(f"q{joint}" for joint in range(1, 8)),
 }
 
+SMALLEST, LARGEST = 32, 16384
+"""Pixels on a side of an image: below that optical flow does not work, above it no camera does."""
+OFF_CENTRE = 0.15
+"""Share of the image by which the principal point may be off its middle before a person is warned."""
+
 MILLIMETRES = 1000.0
 """Units of depth per metre that the writer uses."""
 
 
 class RecordingError(ValueError):
     """What is wrong with a recording, in one line that names the file."""
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A line of a list that was passed over, and why."""
+
+    file: str
+    line: int
+    why: str
+
+    def __str__(self) -> str:
+        return f"{self.file}: line {self.line} is left out: {self.why}"
 
 
 @dataclass(frozen=True)
@@ -62,6 +83,10 @@ class RecordedFrame:
     """[H, W], the pixels that the robot itself covers."""
     labels: NDArray[np.uint16] | None = None
     """[H, W], the true object ids, 0 = no object."""
+    name: str = ""
+    """The colour image's file, as rgb.txt has it; empty while it is in no file."""
+    line: int = 0
+    """Where rgb.txt names it, from 1; 0 while it does not."""
 
 
 def camera_to_json(intrinsics: Intrinsics, depth_scale: float) -> dict[str, float]:
@@ -72,20 +97,43 @@ def camera_to_json(intrinsics: Intrinsics, depth_scale: float) -> dict[str, floa
 def camera_from_json(content: Any) -> tuple[Intrinsics, float]:
     """Intrinsics and units of depth per metre from the content of camera.json.
 
-    Raises RecordingError, without the file's name, if a key is missing or no number.
+    Raises RecordingError, without the file's name, for what cannot be.
     """
-    keys = ("width", "height", "fx", "fy", "cx", "cy", "depth_scale")
+    keys = CAMERA_KEYS.split(", ")
     if not isinstance(content, dict):
-        raise RecordingError(f"it must hold one object with the keys {', '.join(keys)}")
+        raise RecordingError(f"it must hold one object with the keys {CAMERA_KEYS}")
     for key in keys:
-        if not isinstance(content.get(key), int | float):
-            raise RecordingError(f'"{key}" must be a number; the keys are {", ".join(keys)}')
-    if min(content[key] for key in ("width", "height", "fx", "fy", "depth_scale")) <= 0:
-        raise RecordingError("width, height, fx, fy and depth_scale must be above 0")
+        value = content.get(key)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e9:
+            raise RecordingError(f'"{key}" must be a number; the keys are {CAMERA_KEYS}')
+    for key in ("width", "height"):
+        if content[key] % 1 or not SMALLEST <= content[key] <= LARGEST:
+            raise RecordingError(
+                f'"{key}" is {content[key]}, it must be a whole number from {SMALLEST} to {LARGEST}'
+            )
+    for key in ("fx", "fy", "depth_scale"):
+        if content[key] <= 0:
+            raise RecordingError(f'"{key}" is {content[key]}, it must be above 0')
+    for key, size in (("cx", "width"), ("cy", "height")):
+        if not 0 <= content[key] < content[size]:
+            raise RecordingError(f'"{key}" is {content[key]}, outside of the {content[size]} pixels of {size}')
     intrinsics = Intrinsics(
         int(content["width"]), int(content["height"]), *(float(content[key]) for key in keys[2:6])
     )
     return intrinsics, float(content["depth_scale"])
+
+
+def unlikely_camera(k: Intrinsics) -> list[str]:
+    """What is odd about intrinsics, a line each: possible, but most often a mistake."""
+    warnings = []
+    for key, value, size in (("cx", k.cx, k.width), ("cy", k.cy, k.height)):
+        if abs(value - size / 2) > OFF_CENTRE * size:
+            warnings.append(f'"{key}" is {value:g}, far off the middle of {size} pixels')
+    if not 1 / 1.25 < k.fx / k.fy < 1.25:
+        warnings.append(f'"fx" and "fy" are {k.fx:g} and {k.fy:g}; they are nearly equal in most cameras')
+    if not 0.3 < k.fx / k.width < 5:
+        warnings.append(f'"fx" is {k.fx:g} at a width of {k.width}: an unusual angle of view')
+    return warnings
 
 
 def pose_to_numbers(X_WC: NDArray) -> list[float]:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from pydrake.geometry import Box, CollisionFilterDeclaration, GeometrySet, SceneGraphInspector
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import CoulombFriction
-from pydrake.multibody.tree import Frame, JacobianWrtVariable
+from pydrake.multibody.tree import Frame, JacobianWrtVariable, ModelInstanceIndex
 from pydrake.planning import RobotDiagramBuilder
 
 from riseg_drake.robot.description import PandaDescription, add_panda
@@ -79,6 +79,11 @@ class PandaKinematics:
     def inspector(self) -> SceneGraphInspector:
         """What shapes the arm and its tool have."""
         return self._diagram.scene_graph().model_inspector()
+
+    @property
+    def models(self) -> tuple[ModelInstanceIndex, ...]:
+        """The arm, and its tool."""
+        return self.parts.arm, self.parts.pusher
 
     def X_WA(self, q: NDArray, frame: Frame) -> NDArray[np.float64]:
         """Pose [4, 4] of any frame of `plant` at joint angles q [7], rad."""

@@ -1,20 +1,49 @@
 """The pixels that the robot covers in its own camera, from its joint angles alone."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import Box, Capsule, Convex, Cylinder, Mesh, Role, Shape, Sphere
-from pydrake.multibody.tree import RigidBody
+from pydrake.geometry import Box, Capsule, Convex, Cylinder, Mesh, Role, SceneGraphInspector, Shape, Sphere
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame, ModelInstanceIndex, RigidBody
 from scipy.spatial import ConvexHull
 
 from riseg_drake.geometry.camera import Intrinsics
-from riseg_drake.robot.kinematics import PandaKinematics
 
 NEAR = 0.01
 """What is nearer to the camera's centre than this is not drawn, m."""
 _SUBPIXEL_BITS = 4
+
+
+class UnknownShapeError(ValueError):
+    """Which shape of a robot cannot be drawn, and what would be right, in one line."""
+
+
+class Kinematics(Protocol):
+    """A robot with a camera on it: what must be known of it to draw its outline."""
+
+    plant: MultibodyPlant
+
+    @property
+    def inspector(self) -> SceneGraphInspector:
+        """What shapes it has."""
+        ...
+
+    @property
+    def models(self) -> tuple[ModelInstanceIndex, ...]:
+        """What in `plant` is the robot."""
+        ...
+
+    def X_WA(self, q: NDArray, frame: Frame) -> NDArray[np.float64]:
+        """Pose [4, 4] of any frame of `plant` at joint angles q, rad."""
+        ...
+
+    def X_WC(self, q: NDArray) -> NDArray[np.float64]:
+        """Pose [4, 4] of the camera's optical frame at q."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -35,7 +64,7 @@ class RobotSilhouette:
 
     def __init__(
         self,
-        kinematics: PandaKinematics,
+        kinematics: Kinematics,
         intrinsics: Intrinsics,
         margin_m: float = 0.001,
         margin_px: float = 1.0,
@@ -46,7 +75,7 @@ class RobotSilhouette:
         self._hulls = _visible_hulls(kinematics, margin_m)
 
     def mask(self, q: NDArray) -> NDArray[np.bool_]:
-        """True where the robot at joint angles q [7] is in the way, [H, W]."""
+        """True where the robot at joint angles q is in the way, [H, W]."""
         k = self._intrinsics
         image = np.zeros(k.shape, np.uint8)
         X_CW = np.linalg.inv(self._kinematics.X_WC(q))
@@ -88,10 +117,10 @@ def _ahead_of_camera(p_CQ: NDArray, edges: NDArray) -> NDArray | None:
     return np.concatenate([p_CQ[z >= NEAR], start + share[:, None] * (end - start)])
 
 
-def _visible_hulls(kinematics: PandaKinematics, margin: float) -> list[_Hull]:
+def _visible_hulls(kinematics: Kinematics, margin: float) -> list[_Hull]:
     plant, inspector = kinematics.plant, kinematics.inspector
     hulls = []
-    for instance in (kinematics.parts.arm, kinematics.parts.pusher):
+    for instance in kinematics.models:
         for body_index in plant.GetBodyIndices(instance):
             body = plant.get_body(body_index)
             frame = plant.GetBodyFrameIdOrThrow(body_index)
@@ -119,7 +148,13 @@ def _grown(points: NDArray, margin: float) -> tuple[NDArray[np.float64], NDArray
 def _corners(shape: Shape) -> NDArray[np.float64]:
     """Points [N, 3] whose convex hull is a shape's, round ones taken as slightly larger polyhedra."""
     if isinstance(shape, Mesh | Convex):
-        hull = shape.GetConvexHull()
+        try:
+            hull = shape.GetConvexHull()
+        except (RuntimeError, ValueError) as error:
+            reason = " ".join(str(error).split())
+            raise UnknownShapeError(
+                f"a mesh cannot be read, it should be .obj, .gltf or .vtk ({reason})"
+            ) from None
         return np.array([hull.vertex(i) for i in range(hull.num_vertices())])
     if isinstance(shape, Box):
         signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
@@ -137,4 +172,4 @@ def _corners(shape: Shape) -> NDArray[np.float64]:
             * np.concatenate([circle * np.cos(t) + np.sin(t) / np.cos(np.pi / 24) * up for t in tilts])
             + np.repeat(np.where(tilts < 0, -half, half), 24)[:, None] * up
         )
-    raise ValueError(f"the robot's description has a visual {shape}; known are meshes and primitives")
+    raise UnknownShapeError(f"the robot's description has a visual {shape}; known are meshes and primitives")

@@ -17,6 +17,7 @@ from riseg_drake.geometry.plane import (
     transform_plane,
 )
 from riseg_drake.geometry.rgbd import Frame, Immutable
+from riseg_drake.segmentation.table_extent import off_table
 
 _COLOR_SPREAD_MIN = 4.0
 """Gray levels; a table's colour is not known better than that."""
@@ -64,7 +65,7 @@ def objects_above_table(frame: Frame, parameters: AboveTableParameters) -> Above
     answer, whoever asks and however often.
 
     Raises:
-        ValueError: where no table is to be seen.
+        NoPlaneError: where no table is to be seen.
     """
     rng = np.random.default_rng(0)
     seen = ~frame.robot
@@ -78,6 +79,9 @@ def objects_above_table(frame: Frame, parameters: AboveTableParameters) -> Above
     )
     with np.errstate(invalid="ignore"):
         high = (height > low) & seen
+    elsewhere = off_table(frame, height, plane_C, on_table, parameters.height_min)
+    if elsewhere is not None:
+        high &= ~elsewhere
     z = frame.depth[high]
     distance = float(np.median(z)) if len(z) else 1.0
     mask = _without_specks(high, frame, on_table, parameters.area_min / distance**2)

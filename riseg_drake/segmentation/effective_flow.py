@@ -26,6 +26,8 @@ class MovingParameters:
 
     flow_min: float = 0.8
     """Pixels; shorter effective flow is noise."""
+    residual_multiple: float = 4.0
+    """What is shorter than so many standard deviations of the flow of what stands still is noise, too."""
     evidence_min: float = 0.7
     """By how much standing still must explain the images worse, in squared normalised residuals."""
     window: float = 0.006
@@ -55,10 +57,11 @@ def moving_pixels(
     pixels_min = parameters.area_min * pixels_per_metre**2
     window = 2 * max(1, round(0.5 * parameters.window * pixels_per_metre)) + 1
 
+    flow_min = max(parameters.flow_min, parameters.residual_multiple * pair.residual)
     region = bounding_region(above_0.mask, margin=window)
     X_t = effective_flow(optical_flow[region], expected_flow[region])
     with np.errstate(invalid="ignore"):
-        candidate = above_0.mask[region] & (X_t[..., 0] ** 2 + X_t[..., 1] ** 2 > parameters.flow_min**2)
+        candidate = above_0.mask[region] & (X_t[..., 0] ** 2 + X_t[..., 1] ** 2 > flow_min**2)
     if np.count_nonzero(candidate) < pixels_min:
         return moving
     evidence = zero_motion_evidence(pair, expected_flow, optical_flow, region, noise, window)

@@ -8,6 +8,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
 
 from riseg_drake.geometry.rgbd import FramePair, Immutable
 from riseg_drake.segmentation.above_table import AboveTable
+from riseg_drake.segmentation.camera_motion import CameraMotionParameters, PoseError, renewed_pose_error
 from riseg_drake.segmentation.frame_pairs import FramePairParameters, next_pair
 
 
@@ -18,6 +19,8 @@ class RememberedPair(Immutable):
     pair: FramePair
     above_0: AboveTable
     above_1: AboveTable
+    pose_error: PoseError
+    """Of the camera's motion, as the table shows it."""
 
 
 class FramePairMemory(LeafSystem):
@@ -30,14 +33,22 @@ class FramePairMemory(LeafSystem):
         flow_span (1, pixels: effective flow found in the pair that is in memory).
     Output ports, of the pair in memory (None before the first frame):
         pair (FramePair), above_table_reference, above_table (AboveTable at t-1 and at t),
+        pose_error (PoseError: what the table showed of it so far),
         pair_time (1, s: the time of the frame at t; 0 before the first).
     """
 
-    def __init__(self, period: float, offset: float, parameters: FramePairParameters | None = None) -> None:
+    def __init__(
+        self,
+        period: float,
+        offset: float,
+        parameters: FramePairParameters | None = None,
+        camera_motion: CameraMotionParameters | None = None,
+    ) -> None:
         """Look for a new frame every `period` s, `offset` s after the camera's tick."""
         super().__init__()
         self.set_name("FramePair")
         self._parameters = parameters or FramePairParameters()
+        self._camera_motion = camera_motion or CameraMotionParameters()
         self._frame = self.DeclareAbstractInputPort("frame", AbstractValue.Make(object()))
         self._above = self.DeclareAbstractInputPort("above_table", AbstractValue.Make(object()))
         self._flow_span = self.DeclareVectorInputPort("flow_span", 1)
@@ -47,6 +58,7 @@ class FramePairMemory(LeafSystem):
             ("pair", lambda memory: memory.pair),
             ("above_table_reference", lambda memory: memory.above_0),
             ("above_table", lambda memory: memory.above_1),
+            ("pose_error", lambda memory: memory.pose_error),
         ):
             self._declare_output(name, read)
         self.DeclareVectorOutputPort(
@@ -61,13 +73,16 @@ class FramePairMemory(LeafSystem):
         above = self._above.Eval(context)
         if memory is None:
             pair = next_pair(None, frame, 0.0, self._parameters)
-            above_0 = above
+            above_0, error = above, PoseError()
         else:
             flow_span = float(self._flow_span.Eval(context)[0])
             frame = replace(frame, sequence=memory.pair.current.sequence + 1)
             pair = next_pair(memory.pair, frame, flow_span, self._parameters)
             above_0 = memory.above_0 if pair.reference is memory.pair.reference else memory.above_1
-        state.get_mutable_abstract_state(self._memory).set_value(RememberedPair(pair, above_0, above))
+            error = renewed_pose_error(
+                memory.pose_error, memory.pair.current, memory.above_1, frame, above, self._camera_motion
+            )
+        state.get_mutable_abstract_state(self._memory).set_value(RememberedPair(pair, above_0, above, error))
 
     def _declare_output(self, name: str, read: Callable[[RememberedPair], object]) -> None:
         def calc(context: Context, output: AbstractValue) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import cv2
+import numpy as np
 from numpy.typing import NDArray
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, LeafSystem
@@ -16,9 +17,12 @@ from riseg_drake.systems.stage_clock import timed
 class FrameView(LeafSystem):
     """Colour, depth, time and theta_t of one moment, put together.
 
+    Where the camera is and what the robot covers follows from theta_t, or is said by whoever knows it.
+
     Input ports:
         color_image (ImageRgba8U), depth_image (ImageDepth32F, m, aligned to colour),
-        image_time (1, s), position (joint angles theta_t, rad).
+        image_time (1, s), position (joint angles theta_t, rad; if anything follows from them),
+        camera_pose (X_WC [4, 4]; without `X_WC`), robot_pixels ([H, W] bool; without `robot_mask`).
     Output port:
         frame (Frame, `sequence` 0: who stores frames counts them), None while there is no image.
     """
@@ -26,24 +30,40 @@ class FrameView(LeafSystem):
     def __init__(
         self,
         intrinsics: Intrinsics,
-        X_WC: Callable[[NDArray], NDArray],
-        robot_mask: Callable[[NDArray], NDArray],
+        X_WC: Callable[[NDArray], NDArray] | None,
+        robot_mask: Callable[[NDArray], NDArray] | None,
         num_positions: int = 7,
     ) -> None:
-        """`X_WC` and `robot_mask` give the camera's pose and the robot's own pixels at theta."""
+        """`X_WC` and `robot_mask` give the camera's pose and the robot's own pixels at theta.
+
+        Where one of them is None, an input port stands in for it.
+        """
         super().__init__()
         self.set_name("FrameView")
         self._intrinsics, self._X_WC, self._robot_mask = intrinsics, X_WC, robot_mask
         self._color = self.DeclareAbstractInputPort("color_image", AbstractValue.Make(ImageRgba8U()))
         self._depth = self.DeclareAbstractInputPort("depth_image", AbstractValue.Make(ImageDepth32F()))
         self._time = self.DeclareVectorInputPort("image_time", 1)
-        self._position = self.DeclareVectorInputPort("position", num_positions)
+        if X_WC is not None or robot_mask is not None:
+            self._position = self.DeclareVectorInputPort("position", num_positions)
+        if X_WC is None:
+            self.DeclareAbstractInputPort("camera_pose", AbstractValue.Make(object()))
+        if robot_mask is None:
+            self.DeclareAbstractInputPort("robot_pixels", AbstractValue.Make(object()))
         self.DeclareAbstractOutputPort(
             "frame",
             lambda: AbstractValue.Make(object()),
             self._calc_frame,
             prerequisites_of_calc={self.all_input_ports_ticket()},
         )
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """Of the camera whose images come in."""
+        return self._intrinsics
+
+    def _q(self, context: Context) -> NDArray[np.float64]:
+        return self._position.Eval(context)
 
     @timed
     def _calc_frame(self, context: Context, output: AbstractValue) -> None:
@@ -56,7 +76,10 @@ class FrameView(LeafSystem):
                 f"images of {color.width()}x{color.height()} (colour) and {depth.width()}x{depth.height()} "
                 f"(depth), but the intrinsics are for {self._intrinsics.width}x{self._intrinsics.height}"
             )
-        q = self._position.Eval(context)
+        X_WC, robot = (
+            self.GetInputPort(name).Eval(context) if of_position is None else of_position(self._q(context))
+            for of_position, name in ((self._X_WC, "camera_pose"), (self._robot_mask, "robot_pixels"))
+        )
         output.set_value(
             Frame(
                 sequence=0,
@@ -64,7 +87,7 @@ class FrameView(LeafSystem):
                 intrinsics=self._intrinsics,
                 color=cv2.cvtColor(color.data, cv2.COLOR_RGBA2RGB),
                 depth=sanitize_depth(depth.data[..., 0]),
-                X_WC=self._X_WC(q),
-                robot=self._robot_mask(q),
+                X_WC=X_WC,
+                robot=robot,
             )
         )

@@ -10,6 +10,7 @@ from riseg_drake.app.ablation import LITERAL, SWITCHES, ablate, switched, versio
 from riseg_drake.app.cli import main
 from riseg_drake.app.replay import Replay
 from riseg_drake.app.scenario import Scenario, load_scenario
+from riseg_drake.app.segmentation_block import panda_view
 from riseg_drake.recording.layout import RecordingError
 from riseg_drake.recording.reader import RecordingReader
 from riseg_drake.robot.kinematics import PandaKinematics
@@ -58,7 +59,7 @@ def steps(folder):
 @pytest.mark.renders
 def test_a_replay_gives_the_masks_of_the_run_itself(recorded, small_scenario):
     scenario = load_scenario(small_scenario)
-    replay = Replay(scenario, PandaKinematics(scenario.station.panda), seed=1)
+    replay = Replay(scenario, panda_view(scenario, PandaKinematics(scenario.station.panda)), seed=1)
     masks = {round(f.time, 6): replay.mask_after(f).copy() for f in RecordingReader(recorded / "recording")}
     for step in steps(recorded):
         written = cv2.imread(str(recorded / f"step_{step['step']}" / "mask.png"), cv2.IMREAD_UNCHANGED)

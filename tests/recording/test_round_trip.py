@@ -90,7 +90,7 @@ def test_depth_is_found_by_the_nearest_stamp_within_the_limit(tmp_path):
         for frame in frames(3, np.random.default_rng(4)):
             writer.append(frame)
     lines = (tmp_path / "depth.txt").read_text().splitlines()
-    late = ["0.019 depth/000000.png", "0.2 depth/000001.png", "0.1333 depth/000002.png"]
+    late = ["0.019 depth/000000.png", "0.1333 depth/000002.png", "0.2 depth/000001.png"]
     (tmp_path / "depth.txt").write_text("\n".join([lines[0], *late]) + "\n")
     assert [frame.time for frame in RecordingReader(tmp_path)] == [0, 2 / 15]
 

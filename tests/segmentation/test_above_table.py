@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from riseg_drake.geometry.camera import rays
 from riseg_drake.segmentation.above_table import AboveTableParameters, objects_above_table
-from tests.segmentation.drawn_scene import CAMERA, DrawnScene, looking_down, planar
+from tests.segmentation.drawn_scene import CAMERA, DrawnScene, Texture, looking_down, planar
 
 LOW_BOXES = [(0.06, 0.05, 0.015), (0.05, 0.08, 0.015), (0.04, 0.04, 0.05)]
 PLACES = [planar(-0.08, 0.02, 0.4), planar(0.03, 0.02), planar(0.09, -0.06, 1.0)]
@@ -101,3 +102,32 @@ def test_an_image_without_a_table_is_refused() -> None:
     frame.depth[...] = np.random.default_rng(9).uniform(0.3, 3.0, CAMERA.shape)
     with pytest.raises(ValueError, match="no plane"):
         objects_above_table(frame, AboveTableParameters())
+
+
+ROOMS = {
+    "floor and wall far behind": (0.8, 0.08, 1.2),
+    "a wall close behind": (0.9, 0.2, 0.26),
+    "floor to the side": (0.6, 0.12, 3.0),
+}
+
+
+@pytest.mark.parametrize("where", ROOMS)
+def test_a_coloured_table_seen_from_beside_with_the_room_around_it_is_the_table(where: str) -> None:
+    tilt, end, wall = ROOMS[where]
+    rng = np.random.default_rng(10)
+    camera = looking_down(y=-0.5 * np.tan(tilt), z=0.5, tilt=tilt)
+    places = [planar(-0.08, 0.0, 0.4), planar(0.03, 0.0), planar(0.06, -0.09, 1.0)]
+    scene = DrawnScene(LOW_BOXES, table=Texture(9, contrast=12))
+    frame, label = scene.frame(0, camera, places, rng)
+    ray_W = rays(CAMERA) @ camera[:3, :3].T
+    p_WQ = camera[:3, 3] + ray_W * frame.depth[..., None]
+    with np.errstate(divide="ignore"):
+        floor = np.where(ray_W[..., 2] < 0, (-0.7 - camera[2, 3]) / ray_W[..., 2], np.inf)
+        behind = np.where(ray_W[..., 1] > 0, (wall - camera[1, 3]) / ray_W[..., 1], np.inf)
+    beyond = (label == 0) & ((p_WQ[..., 1] > end) | (frame.depth == 0))
+    frame.depth[beyond] = np.minimum(floor, behind)[beyond]
+    above = objects_above_table(frame, AboveTableParameters())
+    np.testing.assert_allclose(above.plane_W, [0, 0, 1, 0], atol=0.01)
+    hit = np.count_nonzero(above.mask & (label > 0))
+    assert hit / np.count_nonzero(label > 0) >= 0.9
+    assert hit / np.count_nonzero(above.mask) >= 0.8

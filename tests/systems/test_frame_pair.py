@@ -129,7 +129,7 @@ JUST_AFTER = OFFSET + 1e-4
 def test_ports_have_the_names_of_the_contract() -> None:
     inputs, outputs = port_names(FramePairMemory(PERIOD, OFFSET))
     assert inputs == ["frame", "above_table", "flow_span"]
-    assert outputs == ["pair", "above_table_reference", "above_table", "pair_time"]
+    assert outputs == ["pair", "above_table_reference", "above_table", "pose_error", "pair_time"]
 
 
 def test_before_the_first_frame_there_is_nothing() -> None:

@@ -1,0 +1,78 @@
+"""Who says where a recording's camera was and what the robot hid: its joints, its files, or nobody."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from riseg_drake.app.scenario import Scenario
+from riseg_drake.recording import layout
+from riseg_drake.recording.layout import RecordingError
+from riseg_drake.recording.reader import RecordingReader
+from riseg_drake.robot.kinematics import PandaKinematics
+from riseg_drake.robot.own_robot import OwnRobot
+from riseg_drake.robot.silhouette import Kinematics, RobotSilhouette, UnknownShapeError
+from riseg_drake.systems.frame_view import FrameView
+
+PANDA_JOINTS = 7
+
+
+@dataclass(frozen=True)
+class RecordedView:
+    """The view of a recording's camera, and in words where it comes from."""
+
+    view: FrameView
+    camera_poses: str
+    robot_pixels: str
+    warnings: list[str]
+
+
+def recorded_view(
+    reader: RecordingReader, scenario: Scenario, robot: Path | None, camera_frame: str
+) -> RecordedView:
+    """The view that fits what a recording holds.
+
+    With joint angles, poses and robot masks follow from them: for the Panda that the scenario describes, or
+    for a robot of one's own. Without, they are those of the recording; without any, the camera stands still
+    and no robot is seen.
+
+    Raises RecordingError or OwnRobotError.
+    """
+    masks = reader.holds_images(layout.ROBOT_FOLDER)
+    if reader.joints is None:
+        if robot is not None:
+            raise RecordingError(
+                f"{reader.folder / layout.JOINT_LIST} is missing; --robot says nothing without joint angles"
+            )
+        return RecordedView(
+            FrameView(reader.intrinsics, None, None),
+            camera_poses=layout.POSE_LIST if reader.poses is not None else "fixed camera",
+            robot_pixels=f"{layout.ROBOT_FOLDER}/" if masks else "none",
+            warnings=[],
+        )
+    number = reader.joints.values.shape[1]
+    kinematics = _kinematics(reader, number, scenario, robot, camera_frame)
+    warnings = []
+    try:
+        robot_mask, source = RobotSilhouette(kinematics, reader.intrinsics).mask, layout.JOINT_LIST
+    except UnknownShapeError as error:
+        robot_mask, source = None, f"{layout.ROBOT_FOLDER}/" if masks else "none"
+        warnings.append(f"{robot}: {error}; robot masks: {source}")
+    return RecordedView(
+        FrameView(reader.intrinsics, kinematics.X_WC, robot_mask, number),
+        camera_poses=layout.JOINT_LIST,
+        robot_pixels=source,
+        warnings=warnings,
+    )
+
+
+def _kinematics(
+    reader: RecordingReader, number: int, scenario: Scenario, robot: Path | None, camera_frame: str
+) -> Kinematics:
+    assert reader.joints is not None
+    if robot is not None:
+        return OwnRobot(robot, camera_frame, reader.joints.names or [""] * number)
+    if number != PANDA_JOINTS:
+        raise RecordingError(
+            f"{reader.joints.path}: line {reader.joints.lines[0]} holds {number} joint angles, the Panda has "
+            f"{PANDA_JOINTS}; name your own robot with --robot and --camera-frame"
+        )
+    return PandaKinematics(scenario.station.panda)

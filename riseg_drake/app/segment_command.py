@@ -1,0 +1,236 @@
+"""`riseg segment`: Alg. 2 over a recording, without a robot."""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, astuple, dataclass, field
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from riseg_drake.app.output import RECORDING, stage_figures
+from riseg_drake.app.recorded_view import RecordedView, recorded_view
+from riseg_drake.app.replay import Replay
+from riseg_drake.app.run import peak_memory_mb
+from riseg_drake.app.scenario import Scenario, load_scenario
+from riseg_drake.app.segment_folder import SegmentFolder
+from riseg_drake.app.tables import score_table, stage_table
+from riseg_drake.evaluation.scores import FIGURES, Scores, score
+from riseg_drake.geometry.plane import NoPlaneError
+from riseg_drake.recording import layout
+from riseg_drake.recording.layout import LeftOut, RecordedFrame, RecordingError
+from riseg_drake.recording.reader import RecordingReader
+from riseg_drake.systems.stage_clock import StageClock
+
+MOST_LINES = 10
+"""More notes than this are counted on the terminal; the summary has them all."""
+MOST_TIMES = 10_000
+"""Calls of each stage whose time is kept: a recording may be longer than memory."""
+
+
+@dataclass(frozen=True)
+class SegmentRequest:
+    """What a person asks of `riseg segment`."""
+
+    recording: Path
+    output: Path | None = None
+    scenario: Path | None = None
+    """Parameters; those of the recorded run, or the built-in ones, if None."""
+    seed: int | None = None
+    """Of the samples; that of the recorded run, or 0, if None."""
+    robot: Path | None = None
+    camera_frame: str = "camera"
+    stamp_limit: float = 0.02
+
+
+@dataclass
+class SegmentResult:
+    """What came of a recording, without its masks."""
+
+    frames: int = 0
+    """Masks written."""
+    object_ids: tuple[int, ...] = ()
+    """Of all objects ever found."""
+    scored: int = 0
+    """Frames with true labels."""
+    last: Scores | None = None
+    """The scores of the last of these."""
+    sums: NDArray[np.float64] = field(default_factory=lambda: np.zeros(len(FIGURES)))
+    """Of the ten figures over them."""
+    left_out: list[LeftOut] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    @property
+    def mean(self) -> Scores:
+        """The mean scores of the frames with true labels."""
+        return Scores(*(self.sums / self.scored).tolist())
+
+
+def segment_command(request: SegmentRequest, console: Console) -> None:
+    """Segment a recording into a folder, tell how it goes, and show the scores if there are labels."""
+    reader = RecordingReader(request.recording, request.stamp_limit)
+    scenario, seed = _parameters(request)
+    view = recorded_view(reader, scenario, request.robot, request.camera_frame)
+    about = {
+        "recording": str(request.recording),
+        "width": reader.intrinsics.width,
+        "height": reader.intrinsics.height,
+        "rate_hz": round(reader.rate, 3),
+        "camera_poses": view.camera_poses,
+        "robot_pixels": view.robot_pixels,
+        "seed": seed,
+    }
+    output = request.output or Path("out") / f"segment_{_recording_name(request.recording)}"
+    clock, result = StageClock(), SegmentResult()
+    with SegmentFolder(output, reader.rate, about) as folder:
+        console.print(f"{len(reader)} frames of {request.recording}, results in {output}", highlight=False)
+        console.print(f"camera poses: {view.camera_poses}; robot pixels: {view.robot_pixels}", highlight=False)
+        with _state_of(folder, result, clock):
+            _segment(reader, view, Replay(scenario, view.view, seed), folder, clock, result, console)
+    _report(result, clock, output, console)
+
+
+def _segment(
+    reader: RecordingReader,
+    view: RecordedView,
+    replay: Replay,
+    folder: SegmentFolder,
+    clock: StageClock,
+    result: SegmentResult,
+    console: Console,
+) -> None:
+    """Put every frame through Alg. 2 and write what comes of it."""
+    clock.watch(replay.stages)
+    told = _Told(console)
+    with Progress(
+        TextColumn("frames"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console
+    ) as progress:
+        bar = progress.add_task("frames", total=len(reader))
+        for frame in reader:
+            _take(frame, reader, replay, folder, result)
+            result.left_out, result.warnings = reader.left_out, [*view.warnings, *reader.warnings]
+            told.tell([*result.warnings, *map(str, result.left_out)])
+            for times in clock.seconds.values():
+                del times[:-MOST_TIMES]
+            progress.update(bar, completed=min(result.frames + len(result.left_out), len(reader)))
+        told.tell([*result.warnings, *map(str, result.left_out)])
+        progress.update(bar, completed=len(reader))
+    if result.frames == 0:
+        raise RecordingError(
+            f"{reader.folder}: no frame shows a table top; the first: {result.left_out[-1].why}"
+        )
+
+
+def _take(
+    frame: RecordedFrame, reader: RecordingReader, replay: Replay, folder: SegmentFolder, result: SegmentResult
+) -> None:
+    try:
+        mask = replay.mask_after(frame)
+    except NoPlaneError as error:
+        reader.leave_out(frame, str(error))
+        return
+    scores = None
+    if frame.labels is not None:
+        scores = result.last = score(mask, frame.labels)
+        result.sums += astuple(scores)
+        result.scored += 1
+    folder.write(frame.name, frame.color, mask, scores)
+    result.frames += 1
+    result.object_ids = replay.segmentation.object_ids
+
+
+class _Told:
+    """Tells every note once, and no more than a person can read."""
+
+    def __init__(self, console: Console):
+        self._console = console
+        self._told: set[str] = set()
+
+    def tell(self, notes: list[str]) -> None:
+        """Say what was not said yet."""
+        for note in notes:
+            if note in self._told:
+                continue
+            self._told.add(note)
+            if len(self._told) <= MOST_LINES:
+                self._console.print(note, style="yellow", markup=False, highlight=False, soft_wrap=True)
+            elif len(self._told) == MOST_LINES + 1:
+                self._console.print("more of this kind is in the summary", style="yellow")
+
+
+def _parameters(request: SegmentRequest) -> tuple[Scenario, int]:
+    """The scenario and the seed: as asked for, as the recorded run had them, or as built in."""
+    own = request.recording / layout.SCENARIO_FILE
+    scenario = load_scenario(request.scenario or (own if own.is_file() else None))
+    if request.seed is not None:
+        return scenario, request.seed
+    run = request.recording / layout.RUN_FILE
+    try:
+        seed = json.loads(run.read_text(encoding="utf-8"))["seed"] if run.is_file() else 0
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        seed = None
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise RecordingError(f'{run} must hold the seed of the run, as {{"seed": 0}}; or give --seed')
+    return scenario, seed
+
+
+def _recording_name(folder: Path) -> str:
+    """What a recording is called; that of a run by its run."""
+    folder = folder.resolve()
+    return folder.parent.name if folder.name == RECORDING else folder.name
+
+
+@contextmanager
+def _state_of(folder: SegmentFolder, result: SegmentResult, clock: StageClock) -> Iterator[None]:
+    """Enter in the summary what came of it, also where it was stopped or failed."""
+    start = perf_counter()
+
+    def finish(state: str, end: str) -> None:
+        scores = {}
+        if result.last is not None:
+            scores = {"scores": result.mean.as_dict(), "scores_last": result.last.as_dict()}
+        folder.note(
+            state=state,
+            end=end,
+            frames=result.frames,
+            objects=len(result.object_ids),
+            object_ids=list(result.object_ids),
+            **scores,
+            left_out=[asdict(line) for line in result.left_out],
+            warnings=result.warnings,
+            stages=stage_figures(clock.seconds),
+            seconds=round(perf_counter() - start, 2),
+            peak_memory_mb=peak_memory_mb(),
+        )
+
+    try:
+        yield
+    except KeyboardInterrupt:
+        finish("interrupted", "stopped by the user")
+        raise KeyboardInterrupt(f"{_masks(result.frames)} in {folder.path}") from None
+    except Exception as error:
+        finish("failed", " ".join(str(error).split()))
+        raise
+    finish("done", "all frames were read")
+
+
+def _report(result: SegmentResult, clock: StageClock, output: Path, console: Console) -> None:
+    objects = len(result.object_ids)
+    console.print(
+        f"{_masks(result.frames)}, {objects} object{'' if objects == 1 else 's'} found, "
+        f"{len(result.left_out)} lines left out",
+        highlight=False,
+    )
+    if result.last is not None:
+        console.print("\nscores in percent")
+        rows = [(f"mean of {result.scored}", result.mean), ("last", result.last)]
+        console.print(score_table(rows, first="\nframes"))
+    console.print(stage_table(stage_figures(clock.seconds), title="time of each stage"))
+
+
+def _masks(number: int) -> str:
+    return "1 mask" if number == 1 else f"{number} masks"

@@ -1,0 +1,172 @@
+"""The lists of a recording: lines that begin with a time stamp, and what belongs to a moment between them."""
+
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.recording.layout import LeftOut, RecordingError
+
+FEW = 1 / 20
+"""Share of a list that may be out of order, or whose files may be missing, and is left out; where it is
+more, the list is not what it says."""
+
+_GAP = 5.0
+"""Between two rows of a table further apart than so many stamp limits nothing is interpolated."""
+
+
+@dataclass(frozen=True)
+class ListedFile:
+    """One line of rgb.txt or depth.txt."""
+
+    line: int
+    time: float
+    """s"""
+    name: str
+    """As the line has it, relative to the recording."""
+
+
+def read_file_list(path: Path) -> tuple[list[ListedFile], list[LeftOut]]:
+    """The lines of a list of images in rising time, and those left out because they are not newer.
+
+    Raises RecordingError, with file and line, for what is no such list.
+    """
+    entries = []
+    for line, cells in _lines(path):
+        if len(cells) != 2:
+            raise RecordingError(f"{path}: line {line} must be: timestamp file")
+        entries.append(ListedFile(line, _number(cells[0], path, line), cells[1]))
+    if not entries:
+        raise RecordingError(f"{path}: it names no image; its lines must be: timestamp file")
+    times = np.array([entry.time for entry in entries])
+    newer, left_out = _in_order(times, [entry.line for entry in entries], path)
+    return [entries[k] for k in newer], left_out
+
+
+@dataclass(frozen=True)
+class StampedTable:
+    """Rows of numbers in rising time; of poses or joint angles."""
+
+    path: Path
+    names: list[str]
+    """What the heading calls the columns, without the stamp; empty if there is no heading."""
+    times: NDArray[np.float64]
+    """[N], s, rising."""
+    values: NDArray[np.float64]
+    """[N, K]"""
+    lines: NDArray[np.intp]
+    """[N], where in the file each row stands, from 1."""
+
+    def bracket(self, time: float, limit: float) -> tuple[int, int, float] | None:
+        """Rows i <= j and a share s such that (1 - s) row_i + s row_j belongs to a time.
+
+        Between two rows near each other s is what lies between; elsewhere the nearest row counts alone.
+        None where no row is within `limit` s.
+        """
+        j = int(np.searchsorted(self.times, time))
+        i = max(0, j - 1)
+        j = min(j, len(self.times) - 1)
+        nearest = i if abs(time - self.times[i]) < abs(time - self.times[j]) else j
+        if abs(self.times[nearest] - time) > limit:
+            return None
+        gap = self.times[j] - self.times[i]
+        if self.times[nearest] == time or not self.times[i] < time < self.times[j] or gap > _GAP * limit:
+            return nearest, nearest, 0.0
+        return i, j, float((time - self.times[i]) / gap)
+
+
+def read_table(
+    path: Path, columns: int | None, separator: str | None = None
+) -> tuple[StampedTable, list[LeftOut]] | None:
+    """A table of numbers, the stamp first, and the rows left out; None if the file is not there.
+
+    `columns` counts the stamp, None takes any number that is the same in all rows. Raises RecordingError.
+    """
+    if not path.exists():
+        return None
+    numbers, lines, names = array("d"), array("q"), _heading(path, separator)
+    for line, cells in _lines(path, separator):
+        columns = columns or max(2, len(cells))
+        if len(cells) != columns:
+            raise RecordingError(f"{path}: line {line} must hold {columns} numbers, it holds {len(cells)}")
+        numbers.extend(_number(cell, path, line) for cell in cells)
+        lines.append(line)
+    if not lines:
+        raise RecordingError(f"{path}: it holds no numbers; fill it or take it away")
+    rows = np.frombuffer(numbers).reshape(len(lines), -1)
+    line_numbers = np.frombuffer(lines, np.int64).astype(np.intp)
+    newer, left_out = _in_order(rows[:, 0], line_numbers.tolist(), path)
+    table = StampedTable(path, names, rows[newer, 0], rows[newer, 1:], line_numbers[newer])
+    return table, left_out
+
+
+def nearest_time(times: NDArray[np.float64], time: float) -> int:
+    """Which of N > 0 rising times [N] is the nearest."""
+    j = int(np.searchsorted(times, time))
+    return min((k for k in (j - 1, j) if 0 <= k < len(times)), key=lambda k: abs(times[k] - time))
+
+
+def _in_order(
+    times: NDArray[np.float64], lines: list[int], path: Path
+) -> tuple[NDArray[np.intp], list[LeftOut]]:
+    """Which stamps [N] are newer than all before, and what is to be said of the others."""
+    newest = np.maximum.accumulate(times)
+    newer = np.concatenate([[True], times[1:] > newest[:-1]])
+    back = np.flatnonzero(np.concatenate([[False], times[1:] < newest[:-1]]))
+    if len(back) > FEW * len(times):
+        k = back[0]
+        before, after = float(newest[k - 1]), float(times[k])
+        raise RecordingError(
+            f"{path}: line {lines[k]}: time runs backwards from {before!r} to {after!r} s; stamps must rise"
+        )
+    if len(times) > 2 and np.count_nonzero(newer) == 1:
+        raise RecordingError(f"{path}: line {lines[1]}: all stamps are equal; stamps must rise")
+    left_out = [
+        LeftOut(
+            str(path),
+            lines[k],
+            "its time runs backwards" if times[k] < newest[k - 1] else "its stamp was there before",
+        )
+        for k in np.flatnonzero(~newer)
+    ]
+    return np.flatnonzero(newer), left_out
+
+
+def _heading(path: Path, separator: str | None) -> list[str]:
+    for line in _text(path).splitlines():
+        if line.startswith("timestamp"):
+            return [cell.strip() for cell in line.split(separator)][1:]
+        if line.strip() and not line.startswith("#"):
+            break
+    return []
+
+
+def _lines(path: Path, separator: str | None = None) -> Iterator[tuple[int, list[str]]]:
+    """The cells of every line that is neither empty, nor a comment, nor the heading of a table."""
+    # Not splitlines(): it knows line ends that text editors, and so people, do not count.
+    for number, line in enumerate(_text(path).split("\n"), start=1):
+        if line.strip() and not line.startswith(("#", "timestamp")):
+            yield number, line.strip().split(separator)
+
+
+def _number(cell: str, path: Path, line: int) -> float:
+    try:
+        value = float(cell)
+    except ValueError:
+        value = np.nan
+    # What is no number of seconds, metres or radians would overflow later on.
+    if not abs(value) < 1e15:
+        raise RecordingError(f"{path}: line {line} holds {cell!r} where a number should be")
+    return value
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise RecordingError(f"{path} is missing") from None
+    except (OSError, UnicodeDecodeError, ValueError):
+        raise RecordingError(f"{path} is not a readable text file") from None

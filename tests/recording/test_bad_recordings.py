@@ -1,0 +1,129 @@
+"""What is wrong with a recording is said in one line, with file and line."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from riseg_drake.app.cli import main
+from riseg_drake.recording.reader import RecordingReader
+from tests.recording.made_recordings import drawn_frames, write
+
+
+@pytest.fixture(scope="module")
+def frames():
+    return drawn_frames(6)
+
+
+@pytest.fixture
+def recording(tmp_path, frames):
+    return write(tmp_path / "recording", frames)
+
+
+def lines_of(path, change):
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join(change(lines)) + "\n")
+
+
+def swapped(lines):
+    return [*lines[:3], lines[4], lines[3], *lines[5:]]
+
+
+def camera(**changes):
+    def change(folder):
+        path = folder / "camera.json"
+        path.write_text(json.dumps({**json.loads(path.read_text()), **changes}))
+
+    return change
+
+
+def list_changed(name, change):
+    return lambda folder: lines_of(folder / name, change)
+
+
+def image(name, pixels):
+    return lambda folder: cv2.imwrite(str(folder / name), pixels)
+
+
+WIDE = np.zeros((120, 170), np.uint16)
+BAD = {
+    "colour stamps swapped": (list_changed("rgb.txt", swapped), "rgb.txt: line 5: time runs backwards"),
+    "depth stamps swapped": (list_changed("depth.txt", swapped), "depth.txt: line 5: time runs backwards"),
+    "poses swapped": (list_changed("groundtruth.txt", swapped), "groundtruth.txt: line 5: time runs backwards"),
+    "no partner": (
+        list_changed("depth.txt", lambda lines: [f"9{line}" for line in lines[1:]]),
+        "rgb.txt: line 2: neither this stamp nor any other has a partner in depth.txt",
+    ),
+    "not a rotation": (
+        list_changed("groundtruth.txt", lambda lines: [*lines[:3], "0.2 0 0 0 0.5 0.5 0 0", *lines[4:]]),
+        "groundtruth.txt: line 4: the quaternion",
+    ),
+    "no focal length": (camera(fx=0), '"fx" is 0, it must be above 0'),
+    "principal point outside": (camera(cx=161.0), '"cx" is 161.0, outside of the 160 pixels of width'),
+    "half a pixel": (camera(width=160.5), '"width" is 160.5, it must be a whole number'),
+    "scale of nothing": (camera(depth_scale=float("nan")), '"depth_scale" must be a number'),
+    "another size": (camera(width=162), "rgb.txt: line 2: "),
+    "gray colour": (image("rgb/000002.png", WIDE.astype(np.uint8)), "rgb.txt: line 4: "),
+    "8 bit depth": (image("depth/000002.png", WIDE.astype(np.uint8)), "it must have 1 channel of 16 bits"),
+    "one image of another size": (image("depth/000003.png", WIDE), "depth.txt: line 5: "),
+    "labels of another size": (image("label/000001.png", WIDE), "label/000001.png has 170x120 pixels"),
+    "an image missing": (
+        lambda folder: (folder / "rgb" / "000003.png").unlink(),
+        "rgb.txt: line 5: ",
+    ),
+    "no camera": (lambda folder: (folder / "camera.json").unlink(), "camera.json is missing"),
+    "no list": (lambda folder: (folder / "rgb.txt").unlink(), "rgb.txt is missing"),
+    "binary list": (lambda folder: (folder / "rgb.txt").write_bytes(b"\xff\xfe\x00"), "readable text file"),
+    "empty list": (list_changed("depth.txt", lambda lines: lines[:1]), "depth.txt: it names no image"),
+    "six joints": (
+        lambda folder: (folder / "joints.csv").write_text("0,1,2,3,4,5,6\n"),
+        "joints.csv: line 1 holds 6 joint angles, the Panda has 7",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", BAD)
+def test_bad_input_is_one_line_with_the_place_and_exit_code_2(recording, capsys, what):
+    damage, message = BAD[what]
+    damage(recording)
+    assert main(["segment", str(recording), "--output", str(recording.parent / "out")]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("riseg: ")
+    assert message in error
+    assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (camera(cx=20.0), '"cx" is 20, far off the middle'),
+        (camera(depth_scale=10.0), "the median depth is"),
+        (camera(fy=300.0), '"fx" and "fy"'),
+    ],
+)
+def test_what_is_unlikely_is_a_warning(recording, change, message):
+    change(recording)
+    reader = RecordingReader(recording)
+    assert len(list(reader)) == 6
+    assert any(message in warning for warning in reader.warnings)
+
+
+def test_a_step_back_in_a_long_list_is_left_out_and_the_rest_is_read(recording):
+    for name, file in (("rgb.txt", "rgb"), ("depth.txt", "depth")):
+        stamps = [0.01 * k if k != 20 else 0.05 for k in range(40)]
+        (recording / name).write_text("".join(f"{t} {file}/{k % 6:06d}.png\n" for k, t in enumerate(stamps)))
+    (recording / "groundtruth.txt").unlink()
+    reader = RecordingReader(recording)
+    assert len(list(reader)) == 39
+    assert {line.line for line in reader.left_out} == {21}
+
+
+def test_a_pose_between_two_rows_is_between_them(recording):
+    rows = ["0 0 0 0 0 0 0 1", "0.02 0.2 0 0 0 0 0.0871557 0.9961947"]
+    (recording / "groundtruth.txt").write_text("\n".join(rows) + "\n")
+    for name, file in (("rgb.txt", "rgb"), ("depth.txt", "depth")):
+        (recording / name).write_text(f"0.005 {file}/000000.png\n")
+    (frame,) = RecordingReader(recording)
+    np.testing.assert_allclose(frame.X_WC[:3, 3], [0.05, 0, 0], atol=1e-9)
+    assert np.degrees(np.arctan2(frame.X_WC[1, 0], frame.X_WC[0, 0])) == pytest.approx(2.5, abs=1e-4)

@@ -1,0 +1,110 @@
+"""Poses that err: the table says by how much, and what stands still says how the camera really moved."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.geometry.se3 import inverse, log_se3
+from riseg_drake.segmentation.above_table import AboveTableParameters, objects_above_table
+from riseg_drake.segmentation.camera_motion import (
+    CameraMotionParameters,
+    PoseError,
+    renewed_pose_error,
+    settled_pair,
+)
+from riseg_drake.segmentation.noise import MeasurementNoise
+from riseg_drake.segmentation.optical_flow import DisFlow
+from tests.segmentation.drawn_scene import CAMERA, Blank, DrawnScene, Texture, looking_down, planar
+
+SIZES = [(0.07, 0.06, 0.03), (0.06, 0.08, 0.05), (0.05, 0.05, 0.04)]
+PLACES = [planar(-0.08, 0.03, 0.3), planar(0.05, 0.05), planar(0.02, -0.07, 1.0)]
+PARAMETERS = CameraMotionParameters()
+ERRS = PoseError(tilt_squares=60 * np.radians(0.14) ** 2, height_squares=30 * 0.0014**2, frames=30)
+"""Of 1 mm and 0.1 degree in each axis of each pose."""
+
+
+def pixels(X: np.ndarray) -> float:
+    """How far a small motion takes the image at 0.45 m, about."""
+    V = log_se3(X)
+    p = V[3:] + np.cross(V[:3], [0, 0, 0.45])
+    return float(CAMERA.fx * np.linalg.norm(p[:2]) / 0.45)
+
+
+def pair_with_error(table, error: np.ndarray, moving: float = 0.0):
+    rng = np.random.default_rng(1)
+    scene = DrawnScene(SIZES, table=table)
+    first, _ = scene.frame(0, looking_down(), PLACES, rng)
+    moved = [PLACES[0] @ planar(moving, 0.0), *PLACES[1:]]
+    X_WC1 = looking_down(x=0.004, y=0.002)
+    second, _ = scene.frame(1, X_WC1, moved, rng)
+    second = replace(second, X_WC=X_WC1 @ error)
+    above = [objects_above_table(f, AboveTableParameters()) for f in (first, second)]
+    pair = FramePair(first, second)
+    flow = DisFlow()(first.color, second.color)
+    return pair, flow, above, inverse(X_WC1) @ looking_down()
+
+
+def small_error() -> np.ndarray:
+    X = np.eye(4)
+    X[:3, :3] = Rotation.from_euler("xyz", [0.12, -0.1, 0.1], degrees=True).as_matrix()
+    X[:3, 3] = [0.001, -0.0012, 0.0008]
+    return X
+
+
+@pytest.mark.parametrize("table", [Blank(), Texture(9, contrast=10)], ids=["blank table", "textured table"])
+@pytest.mark.parametrize("moving", [0.0, 0.006], ids=["all stand still", "one moves"])
+def test_the_cameras_motion_is_set_right_to_a_fraction_of_a_pixel(table, moving) -> None:
+    pair, flow, above, X_true = pair_with_error(table, small_error(), moving)
+    settled = settled_pair(pair, flow, *above, ERRS, MeasurementNoise(), PARAMETERS)
+    assert pixels(pair.X_C1C0 @ inverse(X_true)) > 1.0
+    assert pixels(settled.X_C1C0 @ inverse(X_true)) < 0.35
+    assert 0 < settled.residual < 0.5
+    assert settled.reference is pair.reference
+
+
+def test_exact_poses_are_left_untouched() -> None:
+    pair, flow, above, _ = pair_with_error(Blank(), np.eye(4))
+    exact = renewed_pose_error(PoseError(), pair.reference, above[0], pair.current, above[1], PARAMETERS)
+    assert settled_pair(pair, flow, *above, exact, MeasurementNoise(), PARAMETERS) is pair
+    assert settled_pair(pair, flow, *above, PoseError(), MeasurementNoise(), PARAMETERS) is pair
+
+
+def test_the_motion_is_set_right_no_further_than_poses_may_err() -> None:
+    far = np.eye(4)
+    far[:3, 3] = [0.02, 0, 0]
+    pair, flow, above, _ = pair_with_error(Texture(9, contrast=10), far)
+    settled = settled_pair(pair, flow, *above, ERRS, MeasurementNoise(), PARAMETERS)
+    change = log_se3(settled.X_C1C0 @ inverse(pair.X_C1C0))
+    limit = PARAMETERS.reach * np.repeat(ERRS.sigma(PARAMETERS.confidence), 3)
+    assert (np.abs(change) <= limit * (1 + 1e-9)).all()
+
+
+def test_the_poses_error_is_read_off_the_table() -> None:
+    rng = np.random.default_rng(2)
+    scene, known = DrawnScene(SIZES[:1]), PoseError()
+    before = above = None
+    for k in range(25):
+        X_WC = looking_down(0.002 * k)
+        frame, _ = scene.frame(k, X_WC, PLACES[:1], rng)
+        error = np.eye(4)
+        error[:3, :3] = Rotation.from_rotvec(np.radians(0.1) * rng.normal(size=3)).as_matrix()
+        error[:3, 3] = 0.001 * rng.normal(size=3)
+        frame = replace(frame, X_WC=X_WC @ error)
+        now = objects_above_table(frame, AboveTableParameters())
+        if before is not None:
+            known = renewed_pose_error(known, before, above, frame, now, PARAMETERS)
+        before, above = frame, now
+    rotation, translation = known.sigma(0.5)
+    assert np.degrees(rotation) == pytest.approx(0.1 * np.sqrt(2), rel=0.35)
+    assert translation == pytest.approx(0.001 * np.sqrt(2), rel=0.5)
+    assert known.sigma(0.95) > known.sigma(0.5)
+
+
+def test_a_camera_that_stands_still_says_nothing() -> None:
+    frame, _ = DrawnScene(SIZES).frame(0, looking_down(), PLACES, np.random.default_rng(3))
+    above = objects_above_table(frame, AboveTableParameters())
+    known = renewed_pose_error(PoseError(), frame, above, frame, above, PARAMETERS)
+    assert known.sigma(0.95) == (0.0, 0.0)
