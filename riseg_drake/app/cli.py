@@ -94,6 +94,31 @@ def _parser() -> argparse.ArgumentParser:
         help="also record the runs, and segment them as the paper has it, one switch at a time",
     )
 
+    emulate = _add(
+        commands,
+        "emulate",
+        _emulate,
+        "Stand in for the drivers of a Panda and a RealSense camera on LCM, around a simulated scene.\n"
+        "Runs at wall-clock time until Ctrl-C, and misbehaves when it is told to.",
+    )
+    _add_scenario(emulate)
+    emulate.add_argument("--seed", type=int, default=0, metavar="N", help="draws scene, noise and faults (0)")
+    emulate.add_argument(
+        "--control-mode",
+        choices=("status_only", "velocity", "position"),
+        help="the arm driver's flag (as the scenario says: position)",
+    )
+    emulate.add_argument(
+        "--fault",
+        action="append",
+        default=[],
+        metavar="WORD",
+        help="misbehave from the start, such as 'images drop 0.1' or 'status delay 0.03'; may be repeated",
+    )
+    emulate.add_argument(
+        "--say", metavar="WORD", help="tell a running emulator: reflex, stop, recover, 'die 2', or a fault"
+    )
+
     score = _add(
         commands,
         "score",
@@ -177,6 +202,12 @@ def _evaluate(chosen: argparse.Namespace, console: Console) -> None:
     )
 
 
+def _emulate(chosen: argparse.Namespace, console: Console) -> None:
+    from riseg_drake.app.emulate import emulate_command
+
+    emulate_command(chosen.scenario, chosen.seed, chosen.control_mode, chosen.fault, chosen.say, console)
+
+
 def _score(chosen: argparse.Namespace, console: Console) -> None:
     from riseg_drake.app.score_command import score_command
 
@@ -204,6 +235,9 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.app.scene_pool import ClusterError
     from riseg_drake.evaluation.label_folders import LabelFolderError
     from riseg_drake.recording.layout import RecordingError
+    from riseg_drake.stations.lcm_channels import LcmError
+    from riseg_drake.stations.misbehaviour import WordError
+    from riseg_drake.stations.panda_driver import DriverEndedError
     from riseg_drake.stations.scene import SceneError
 
     return (
@@ -215,4 +249,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
         RecordingError,
         EvaluationError,
         ClusterError,
+        LcmError,
+        WordError,
+        DriverEndedError,
     )

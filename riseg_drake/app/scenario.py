@@ -11,6 +11,7 @@ from riseg_drake.segmentation.bfif import BFIFParameters
 from riseg_drake.segmentation.frame_pairs import FramePairParameters
 from riseg_drake.segmentation.optical_flow import DisFlowParameters
 from riseg_drake.segmentation.segment import SegmentParameters
+from riseg_drake.stations.emulated_drivers import EmulatorConfig
 from riseg_drake.stations.simulated import SimulatedStationConfig
 from riseg_drake.systems.arm_motion import ArmMotionParameters
 
@@ -37,6 +38,8 @@ class Scenario:
     """Alg. 3, and the arm's path for a push."""
     arm: ArmMotionParameters = field(default_factory=ArmMotionParameters)
     """Alg. 1: when to look, and how many pushes at most."""
+    emulator: EmulatorConfig = field(default_factory=EmulatorConfig)
+    """The drivers that `riseg emulate` stands in for, around the station above."""
     longest: float = 300.0
     """A run ends after this time even if the arm is not done, simulated seconds."""
 

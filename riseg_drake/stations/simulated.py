@@ -30,12 +30,18 @@ from pydrake.multibody.plant import (
     DiscreteContactApproximation,
     MultibodyPlant,
 )
-from pydrake.multibody.tree import Frame, ModelInstanceIndex, PdControllerGains
+from pydrake.multibody.tree import BodyIndex, Frame, ModelInstanceIndex, PdControllerGains
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import Demultiplexer, StateInterpolatorWithDiscreteDerivative
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
 
-from riseg_drake.robot.description import JOINT_NAMES, PandaDescription, add_panda, register_models
+from riseg_drake.robot.description import (
+    JOINT_NAMES,
+    PandaDescription,
+    PandaParts,
+    add_panda,
+    register_models,
+)
 from riseg_drake.robot.kinematics import PandaKinematics, observe_pose
 from riseg_drake.stations.scene import (
     PlacedObject,
@@ -95,6 +101,65 @@ class SimulatedStationConfig:
     """Height of the camera above the table at the start, m; unused where start_position is given."""
 
 
+@dataclass(frozen=True)
+class SimulatedWorld:
+    """Arm, table and objects in a plant, without anything that looks at them or moves them."""
+
+    plant: MultibodyPlant
+    """Finalized."""
+    scene_graph: SceneGraph
+    panda: PandaParts
+    objects: list[PlacedObject]
+    """As they were placed; object id i + 1 is `objects[i]`."""
+    object_bodies: dict[int, BodyIndex]
+    """Index of the body of each object id."""
+
+
+def add_world(
+    builder: DiagramBuilder,
+    config: SimulatedStationConfig,
+    seed: int,
+    step: float,
+    objects: Sequence[PlacedObject] | None = None,
+) -> SimulatedWorld:
+    """Add the plant of a station to a diagram, the arm in its start position; `step` in s.
+
+    `objects` replaces the scene that `config.scene` would draw from the seed. Raises ValueError.
+    """
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, step)
+    # With these two, pushes of 2 cm end within a millimetre and things lie still (at 1 to 2 ms).
+    plant.set_contact_model(ContactModel.kPoint)
+    plant.set_discrete_contact_approximation(DiscreteContactApproximation.kLagged)
+    panda = add_panda(plant, config.panda)
+    for instance in (panda.arm, panda.pusher):
+        plant.set_gravity_enabled(instance, False)
+    _add_table(plant, scene_graph, config.table)
+    if objects is None:
+        objects = draw_scene(config.scene, np.random.default_rng(seed))
+    object_bodies = add_scene(plant, objects)
+    _set_gains(plant, panda.arm, config)
+    plant.Finalize()
+    plant.SetDefaultPositions(panda.arm, start_position(config))
+    return SimulatedWorld(plant, scene_graph, panda, list(objects), object_bodies)
+
+
+def ideal_camera(plant: MultibodyPlant, frame: Frame, config: CameraConfig) -> RgbdSensor:
+    """A camera at a frame of a plant that sees without noise; it needs the renderer RENDERER."""
+    k = config
+    core = RenderCameraCore(
+        RENDERER,
+        CameraInfo(k.width, k.height, k.fx, k.fy, k.cx, k.cy),
+        ClippingRange(*CLIPPING),
+        RigidTransform(),
+    )
+    return RgbdSensor(
+        plant.GetBodyFrameIdOrThrow(frame.body().index()),
+        frame.GetFixedPoseInBodyFrame(),
+        ColorRenderCamera(core),
+        DepthRenderCamera(core, DepthRange(*CLIPPING)),
+    )
+
+
 class SimulatedStation(Diagram):
     """The ports of `contract.py`, and the ground truth as `cheat.*`.
 
@@ -118,28 +183,17 @@ class SimulatedStation(Diagram):
         steps_a_picture = int(np.ceil(1 / (config.camera.rate * config.time_step) - 1e-9))
         step = 1 / (config.camera.rate * steps_a_picture)
         builder = DiagramBuilder()
-        plant, scene_graph = AddMultibodyPlantSceneGraph(builder, step)
-        # With these two, pushes of 2 cm end within a millimetre and things lie still (at 1 to 2 ms).
-        plant.set_contact_model(ContactModel.kPoint)
-        plant.set_discrete_contact_approximation(DiscreteContactApproximation.kLagged)
-        scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(config.renderer))
-        panda = add_panda(plant, config.panda)
-        for instance in (panda.arm, panda.pusher):
-            plant.set_gravity_enabled(instance, False)
-        _add_table(plant, scene_graph, config.table)
-        if objects is None:
-            objects = draw_scene(config.scene, np.random.default_rng(seed))
-        self.objects = list(objects)
+        world = add_world(builder, config, seed, step, objects)
+        plant, scene_graph, panda = world.plant, world.scene_graph, world.panda
+        self.objects = world.objects
         """The scene as it was at the start; object id i + 1 is `objects[i]`."""
-        self.object_bodies = add_scene(plant, self.objects)
+        self.object_bodies = world.object_bodies
         """Index of the body of each object id."""
-        _set_gains(plant, panda.arm, config)
-        plant.Finalize()
-        plant.SetDefaultPositions(panda.arm, start_position(config))
         self.plant = plant
         self.scene_graph = scene_graph
 
         self._wire_arm(builder, panda.arm, step)
+        scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(config.renderer))
         self._wire_camera(builder, panda.camera_frame, config.camera, seed, step)
         builder.ExportOutput(plant.get_body_poses_output_port(), "cheat.body_poses")
         if meshcat is not None:
@@ -161,21 +215,7 @@ class SimulatedStation(Diagram):
         self, builder: DiagramBuilder, frame: Frame, config: CameraConfig, seed: int, step: float
     ) -> None:
         k = config
-        core = RenderCameraCore(
-            RENDERER,
-            CameraInfo(k.width, k.height, k.fx, k.fy, k.cx, k.cy),
-            ClippingRange(*CLIPPING),
-            RigidTransform(),
-        )
-        sensor = builder.AddNamedSystem(
-            "ideal_camera",
-            RgbdSensor(
-                self.plant.GetBodyFrameIdOrThrow(frame.body().index()),
-                frame.GetFixedPoseInBodyFrame(),
-                ColorRenderCamera(core),
-                DepthRenderCamera(core, DepthRange(*CLIPPING)),
-            ),
-        )
+        sensor = builder.AddNamedSystem("ideal_camera", ideal_camera(self.plant, frame, k))
         # A quarter of a step after the plant's own: joint angles read within the millisecond after that
         # are those of the picture.
         camera = builder.AddNamedSystem("wrist_camera", WristCamera(k, seed, 1 / k.rate, step / 4))

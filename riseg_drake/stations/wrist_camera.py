@@ -43,6 +43,16 @@ class CameraConfig:
         return Intrinsics(self.width, self.height, self.fx, self.fy, self.cx, self.cy)
 
 
+def measured_images(
+    color: NDArray[np.uint8], depth: NDArray, config: CameraConfig, rng: np.random.Generator
+) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    """What the sensor makes of true colour [H, W, 3] and depth [H, W], m: with noise, and 0 = invalid."""
+    seen = noisy_color(np.ascontiguousarray(color), config.noise, rng)
+    measured = noisy_depth(sanitize_depth(depth), config.noise, rng)
+    within = (measured >= config.depth_min) & (measured <= config.depth_max)
+    return seen, measured * within
+
+
 class WristCamera(LeafSystem):
     """Takes a noisy picture of what the ideal sensor at its inputs shows, and holds it.
 
@@ -54,8 +64,7 @@ class WristCamera(LeafSystem):
 
     def __init__(self, config: CameraConfig, seed: int, period: float, delay: float):
         super().__init__()
-        self._noise = config.noise
-        self._depth_range = (config.depth_min, config.depth_max)
+        self._config = config
         self._seed = seed
         size = (config.width, config.height)
         self._color_in = self.DeclareAbstractInputPort("color_image", Value(ImageRgba8U(*size)))
@@ -83,10 +92,9 @@ class WristCamera(LeafSystem):
         depth = state.get_mutable_abstract_state(int(self._depth)).get_mutable_value()
         seen = self._color_in.Eval(context).data
         color.mutable_data[:] = seen
-        color.mutable_data[..., :3] = noisy_color(np.ascontiguousarray(seen[..., :3]), self._noise, rng)
-        measured = noisy_depth(sanitize_depth(self._depth_in.Eval(context).data[..., 0]), self._noise, rng)
-        nearest, farthest = self._depth_range
-        depth.mutable_data[..., 0] = measured * ((measured >= nearest) & (measured <= farthest))
+        color.mutable_data[..., :3], depth.mutable_data[..., 0] = measured_images(
+            seen[..., :3], self._depth_in.Eval(context).data[..., 0], self._config, rng
+        )
         stamp.set_value([context.get_time(), number])
 
 

@@ -1,0 +1,174 @@
+"""`riseg emulate`: the drivers of arm and camera, each in a process of its own, around one simulated world.
+
+Drawing a picture takes tens of milliseconds, and the arm's status is due every single one: so the arm's
+process does the physics and sends the camera's process where everything is, at the camera's rate.
+"""
+
+import gc
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from pathlib import Path
+from time import sleep, time
+
+from rich.console import Console
+
+from riseg_drake.app.graphics import require_graphics
+from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
+from riseg_drake.app.scenario_file import ScenarioError
+from riseg_drake.stations.emulated_arm import TICK_US, EmulatedArm
+from riseg_drake.stations.emulated_camera import EmulatedCamera
+from riseg_drake.stations.emulated_drivers import CameraSide, Moment, PandaSide
+from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm, receive_buffer_warning
+from riseg_drake.stations.misbehaviour import CONTROL_CHANNEL, WORDS, WordError, parse_word
+
+_GIVE_WAY = 5  # niceness of the camera's process: pictures can wait, the arm's status cannot
+_LONGEST_WAIT = 0.05  # s, until the camera's process listens for words again
+
+
+def emulate_command(
+    scenario_file: Path | None,
+    seed: int,
+    control_mode: str | None,
+    faults: Sequence[str],
+    say: str | None,
+    console: Console,
+) -> None:
+    """Behave as the drivers do until Ctrl-C; or, with `say`, tell a running emulator a word."""
+    scenario = load_scenario(scenario_file)
+    config = scenario.emulator
+    for word in [*faults, *([say] if say else [])]:
+        parse_word(word)
+    if say:
+        open_lcm(config.lcm).Publish(CONTROL_CHANNEL, say.encode())
+        return
+    require_graphics()
+    if control_mode:
+        config.driver.control_mode = control_mode
+    warning = receive_buffer_warning(config.lcm.url)
+    if warning:
+        console.print(f"[yellow]{warning}")
+    name = scenario_name(scenario_file)
+    with console.status("placing the objects"), _camera_process(scenario_file, seed) as camera:
+        _run(scenario, seed, camera, faults, f"{name}, seed {seed}", console)
+
+
+def _run(
+    scenario: Scenario, seed: int, camera: Connection, faults: Sequence[str], title: str, console: Console
+) -> None:
+    config = scenario.emulator
+    lcm = open_lcm(config.lcm)
+    try:
+        arm = EmulatedArm(scenario.station, config.driver, seed, _wall_us())
+    except (ValueError, RuntimeError) as error:
+        raise ScenarioError(" ".join(str(error).split())) from error
+    side = PandaSide(lcm, config, arm, seed)
+    camera.recv()  # it is ready
+    console.print(
+        f"{title}: {config.lcm.status_channel} and {config.lcm.image_channel} on {config.lcm.url}, "
+        f"--control_mode={config.driver.control_mode}; Ctrl-C ends it"
+    )
+    for word in faults:
+        open_lcm(config.lcm).Publish(CONTROL_CHANNEL, word.encode())
+    if _may_read_terminal():
+        if sys.stdin.isatty():
+            console.print(f"you may type: {WORDS}")
+        threading.Thread(target=_pass_on, args=(config.lcm, console), daemon=True).start()
+    gc.collect()
+    gc.freeze()  # what is there stays there: no pauses to look through it
+    start = time()
+    try:
+        _keep_time(side, camera, 1 / config.rate, console)
+    except KeyboardInterrupt:
+        elapsed = time() - start
+        camera.send(None)
+        pictures = camera.recv()
+        console.print(
+            f"ended after {elapsed:.0f} s: status at {side.published / elapsed:.0f} Hz, "
+            f"pictures at {pictures / elapsed:.1f} Hz"
+        )
+
+
+def _keep_time(side: PandaSide, camera: Connection, period: float, console: Console) -> None:
+    """Keep the arm's world at wall time, and have it drawn every `period` s."""
+    arm = side.arm
+    next_picture = 0
+    while True:
+        side.advance(_wall_us())
+        for note in side.notes():
+            console.print(note)
+        if arm.state_us >= next_picture:
+            # Late pictures do not bring the next one nearer.
+            next_picture = max(next_picture + int(1e6 * period), arm.state_us + int(0.5e6 * period))
+            camera.send(Moment(arm.state_us, arm.positions(), not arm.driver.is_moving))
+        sleep(max(0.0, 1e-6 * (arm.wall_us + TICK_US - _wall_us())))
+
+
+@contextmanager
+def _camera_process(scenario_file: Path | None, seed: int) -> Iterator[Connection]:
+    """The camera's process for the time of a `with`; it first says that it is ready."""
+    spawn = get_context("spawn")
+    here, there = spawn.Pipe()
+    process = spawn.Process(target=_draw, args=(there, scenario_file, seed), daemon=True)
+    process.start()
+    there.close()
+    try:
+        yield here
+    finally:
+        here.close()
+        process.join(timeout=5)
+
+
+def _draw(commands: Connection, scenario_file: Path | None, seed: int) -> None:
+    """The camera's process: draws where everything was said to be, and falls behind rather than late."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the other process's to hear
+    os.nice(_GIVE_WAY)
+    scenario = load_scenario(scenario_file)
+    side = CameraSide(
+        open_lcm(scenario.emulator.lcm), scenario.emulator, EmulatedCamera(scenario.station, seed), seed
+    )
+    commands.send("ready")
+    gc.collect()
+    gc.freeze()
+    try:
+        while True:
+            wait = side.flush(time()) - time()
+            if not commands.poll(max(0.0, min(wait, _LONGEST_WAIT))):
+                continue
+            moment = commands.recv()
+            while moment is not None and commands.poll():
+                moment = commands.recv()  # only the newest is worth drawing
+            if moment is None:
+                break
+            side.show(moment, time())
+        commands.send(side.published)
+    except EOFError:  # the other process is gone
+        return
+
+
+def _pass_on(config: LcmConfig, console: Console) -> None:
+    """Send what the operator types to both processes; each picks out what is meant for it."""
+    lcm = open_lcm(config)
+    for line in sys.stdin:
+        if line.strip():
+            try:
+                parse_word(line)
+                lcm.Publish(CONTROL_CHANNEL, line.strip().encode())
+            except WordError as error:
+                console.print(str(error))
+
+
+def _may_read_terminal() -> bool:
+    """Whether the operator can type here; a program in the background is stopped when it tries to read."""
+    if sys.stdin is None or sys.stdin.closed:
+        return False
+    return not sys.stdin.isatty() or os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
+
+
+def _wall_us() -> int:
+    return int(1e6 * time())

@@ -1,0 +1,202 @@
+"""Both drivers as they behave on LCM, each around its half of the simulated world."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from drake import lcmt_panda_command
+from numpy.typing import NDArray
+from pydrake.lcm import DrakeLcmInterface
+
+from riseg_drake.stations.emulated_arm import TICK_US, EmulatedArm
+from riseg_drake.stations.emulated_camera import EmulatedCamera
+from riseg_drake.stations.ground_truth import LABEL_CHANNEL, POSE_CHANNEL, encode_labels, encode_poses
+from riseg_drake.stations.lcm_channels import LcmConfig
+from riseg_drake.stations.lcm_images import encode_images
+from riseg_drake.stations.misbehaviour import CONTROL_CHANNEL, UnreliableLink, Word, WordError, parse_word
+from riseg_drake.stations.panda_driver import PandaDriverConfig
+
+_LONGEST_CATCHING_UP = 50_000  # us; if this process was kept from running for longer, time is skipped
+
+
+@dataclass
+class EmulatorConfig:
+    """How the emulated drivers were started."""
+
+    lcm: LcmConfig = field(default_factory=LcmConfig)
+    """Network and channels."""
+    driver: PandaDriverConfig = field(default_factory=PandaDriverConfig)
+    """The arm's driver."""
+    rate: float = 10.0
+    """Pictures a second at most; fewer come where drawing takes longer."""
+    software_depth_registration: bool = True
+    """The camera driver's flag of that name: whether aligned depth is published."""
+    ir: bool = False
+    """The camera driver's flag of that name (there it is on by default): whether infrared is published."""
+
+
+class _Ears:
+    """Hears the words on the control channel, and keeps what there is to tell the operator."""
+
+    def __init__(self, lcm: DrakeLcmInterface):
+        self._words: list[Word] = []
+        self._notes: list[str] = []
+        lcm.Subscribe(CONTROL_CHANNEL, self._hear)
+
+    def _hear(self, raw: bytes) -> None:  # LCM calls this from C: nothing may be raised
+        try:
+            self._words.append(parse_word(raw.decode(errors="replace")))
+        except WordError as error:
+            self._notes.append(str(error))
+
+    def words(self, *subjects: str) -> Iterator[Word]:
+        """What was said about these subjects since the last call; all else is for others."""
+        said, self._words = self._words, []
+        return (word for word in said if word.subject in subjects)
+
+    def note(self, text: str) -> None:
+        """Something to tell."""
+        self._notes.append(text)
+
+    def notes(self) -> list[str]:
+        """What there is to tell since the last call."""
+        notes, self._notes = self._notes, []
+        return notes
+
+
+class PandaSide:
+    """The arm's driver: commands in, status out, around the physics of the world."""
+
+    def __init__(self, lcm: DrakeLcmInterface, config: EmulatorConfig, arm: EmulatedArm, seed: int):
+        self.arm = arm
+        self.published = 0
+        """Status messages so far."""
+        self._lcm = lcm
+        self._channel = config.lcm.status_channel
+        self._link = UnreliableLink(np.random.default_rng([seed, 1]))
+        self._ears = _Ears(lcm)
+        self._dead_until: int | None = None
+        self._mode = arm.driver.robot_mode
+        lcm.Subscribe(config.lcm.command_channel, self._hear)
+
+    def _hear(self, raw: bytes) -> None:  # LCM calls this from C: nothing may be raised
+        try:
+            command = lcmt_panda_command.decode(raw)
+        except Exception as error:  # whatever the decoder makes of bytes that are no command
+            self._ears.note(f"a message that is no lcmt_panda_command was ignored ({error})")
+            return
+        if self._dead_until is None:
+            self.arm.driver.receive(command)
+
+    def notes(self) -> list[str]:
+        """What happened since the last call, a line each."""
+        return self._ears.notes()
+
+    def advance(self, wall_us: int) -> None:
+        """Let the world come up to a wall time, microseconds, and publish the status of its last tick.
+
+        Raises DriverEndedError where the real driver would end.
+        """
+        now = 1e-6 * wall_us
+        behind = wall_us - self.arm.wall_us
+        if behind > _LONGEST_CATCHING_UP:
+            self.arm.skip(behind - TICK_US)
+        if not self._link.is_stalled(now):
+            self._lcm.HandleSubscriptions(0)
+        for word in self._ears.words("arm", "status"):
+            self._obey(word, wall_us)
+        if self._dead_until is not None and wall_us >= self._dead_until:
+            self._dead_until = None
+            self.arm.driver.restart()
+            self._ears.note("the driver is back")
+        ticks = 0
+        while self.arm.wall_us + TICK_US <= wall_us:
+            self.arm.tick()
+            ticks += 1
+        self._tell_mode()
+        if ticks and self._dead_until is None:
+            self._link.send(self.arm.status().encode(), now)
+        for message in self._link.due(now):
+            self._lcm.Publish(self._channel, message)
+            self.published += 1
+
+    def _obey(self, word: Word, wall_us: int) -> None:
+        driver = self.arm.driver
+        match word.subject, word.verb:
+            case "status", _:
+                self._link.obey(word, 1e-6 * wall_us)
+            case _, "reflex":
+                driver.enter_reflex("asked for")
+            case _, "stop":
+                driver.user_stop()
+            case _, "recover":
+                driver.restart()
+            case _, "die":
+                driver.die()
+                self._dead_until = wall_us + int(1e6 * word.amount)
+                self._ears.note(f"the driver is dead for {word.amount:g} s")
+
+    def _tell_mode(self) -> None:
+        driver = self.arm.driver
+        if driver.robot_mode != self._mode:
+            self._mode = driver.robot_mode
+            reason = f" ({driver.reflex_reason})" if driver.reflex_reason else ""
+            self._ears.note(f"robot_mode is {self._mode}{reason}")
+
+
+@dataclass(frozen=True)
+class Moment:
+    """The world at one moment, as the arm's side hands it to the camera's."""
+
+    wall_us: int
+    """Wall time, microseconds."""
+    positions: NDArray[np.float64]
+    """Of all joints and bodies, in the plant's order."""
+    is_standing: bool
+    """Whether the arm stands still."""
+
+
+class CameraSide:
+    """The camera's driver: pictures out, and the truth about them on channels of its own."""
+
+    def __init__(self, lcm: DrakeLcmInterface, config: EmulatorConfig, camera: EmulatedCamera, seed: int):
+        self.published = 0
+        """Pictures so far, before any went astray."""
+        self._lcm = lcm
+        self._config = config
+        self._camera = camera
+        self._link = UnreliableLink(np.random.default_rng([seed, 2]))
+        self._ears = _Ears(lcm)
+
+    def show(self, moment: Moment, now: float) -> None:
+        """Take a picture of the world as it was at a moment; `now` is the wall time, s."""
+        self._camera.look(moment.positions)
+        picture = self._camera.picture(self.published)
+        shape = picture.depth.shape
+        infrared = {name: picture.color[..., 1].reshape(shape) for name in ("infrared", "infrared_stereo")}
+        message = encode_images(
+            picture.color,
+            picture.depth if self._config.software_depth_registration else None,
+            time=1e-6 * moment.wall_us,
+            sent=now,
+            sequence=self.published,
+            raw_depth=picture.raw_depth,
+            infrared=infrared if self._config.ir else None,
+        )
+        stamp_ms = message.images[0].header.utime
+        if moment.is_standing:  # a third of the time that a picture takes; nobody scores masks on the way
+            labels = encode_labels(self._camera.labels(), stamp_ms, self.published)
+            self._lcm.Publish(LABEL_CHANNEL, labels.encode())
+        poses = encode_poses(self._camera.names, self._camera.object_poses(), stamp_ms)
+        self._lcm.Publish(POSE_CHANNEL, poses.encode())
+        self._link.send(message.encode(), now)
+        self.published += 1
+
+    def flush(self, now: float) -> float:
+        """Publish what has arrived by `now`, s, and listen; returns when more will arrive, s, or inf."""
+        self._lcm.HandleSubscriptions(0)
+        for word in self._ears.words("images"):
+            self._link.obey(word, now)
+        for message in self._link.due(now):
+            self._lcm.Publish(self._config.lcm.image_channel, message)
+        return self._link.next_arrival()
