@@ -64,7 +64,7 @@ def _run(
     config = scenario.emulator
     lcm = open_lcm(config.lcm)
     try:
-        arm = EmulatedArm(scenario.station, config.driver, seed, _wall_us())
+        arm = EmulatedArm(scenario.simulated, config.driver, seed, _wall_us())
     except (ValueError, RuntimeError) as error:
         raise ScenarioError(" ".join(str(error).split())) from error
     side = PandaSide(lcm, config, arm, seed)
@@ -130,7 +130,7 @@ def _draw(commands: Connection, scenario_file: Path | None, seed: int) -> None:
     os.nice(_GIVE_WAY)
     scenario = load_scenario(scenario_file)
     side = CameraSide(
-        open_lcm(scenario.emulator.lcm), scenario.emulator, EmulatedCamera(scenario.station, seed), seed
+        open_lcm(scenario.emulator.lcm), scenario.emulator, EmulatedCamera(scenario.simulated, seed), seed
     )
     commands.send("ready")
     gc.collect()

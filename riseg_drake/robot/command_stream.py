@@ -4,7 +4,7 @@ All of it is arithmetic on what it is given, time included; the process around i
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +66,10 @@ class ArmStatus:
     torque_external: NDArray[np.float64]
     """External torques as the driver gives them, N m [7]; only their size is used."""
     robot_mode: int
+
+    def shifted(self, offset: float) -> "ArmStatus":
+        """The same, said `offset` s later."""
+        return replace(self, time=self.time + offset) if offset else self
 
 
 @dataclass(frozen=True)

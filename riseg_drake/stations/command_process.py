@@ -12,7 +12,6 @@ import multiprocessing
 import os
 import select
 import signal
-import struct
 import threading
 import time
 from collections import deque
@@ -24,7 +23,6 @@ from typing import Any
 import numpy as np
 from drake import lcmt_panda_command, lcmt_panda_status
 from numpy.typing import NDArray
-from pydrake.multibody.plant import MultibodyPlant  # noqa: F401  (imported before the stream begins, not in it)
 
 from riseg_drake.robot.command_stream import (
     VELOCITY,
@@ -37,6 +35,7 @@ from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.robot.supervisor import Cause, Mode, SafetyState
 from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm
+from riseg_drake.stations.lcm_reception import array_time, status_of
 
 FINAL_COMMANDS = 20
 """How many commands at rest end the stream: zeros, in velocity mode."""
@@ -63,17 +62,6 @@ class StreamReport:
     at_rest: bool
     refused: str = ""
     """Why targets were not taken, if they were not."""
-
-
-def status_of(message: lcmt_panda_status) -> ArmStatus:
-    """The part of the driver's status that commands depend on."""
-    return ArmStatus(
-        time=message.utime * 1e-6,
-        position=np.array(message.joint_position),
-        velocity=np.array(message.joint_velocity),
-        torque_external=np.array(message.joint_torque_external),
-        robot_mode=message.robot_mode,
-    )
 
 
 def command_message(command: NDArray, mode: str, now: float) -> lcmt_panda_command:
@@ -183,10 +171,7 @@ class _News:
         self._status_data = data
 
     def _take_images(self, data: bytes) -> None:
-        # The stamp of the array, behind the fingerprint and the sequence number, of 8 bytes each: a picture
-        # need not be decoded to know its age.
-        (utime,) = struct.unpack_from(">q", data, 16)
-        self.image_time = utime * 1e-6
+        self.image_time = array_time(data)
 
     def read(self) -> ArmStatus | None:
         """Take in what has come; returns the arm's newest status."""
