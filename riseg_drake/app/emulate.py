@@ -84,6 +84,8 @@ def _run(
     start = time()
     try:
         _keep_time(side, camera, 1 / config.rate, console)
+    except (BrokenPipeError, ConnectionResetError) as error:
+        raise RuntimeError("the camera's process has died") from error
     except KeyboardInterrupt:
         elapsed = time() - start
         camera.send(None)

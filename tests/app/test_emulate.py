@@ -1,0 +1,154 @@
+"""Two processes on the real network; every wait ends with a message or with the deadline of the test."""
+
+import os
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from drake import lcmt_image_array, lcmt_panda_command, lcmt_panda_status
+from pydrake.lcm import DrakeLcm
+
+from riseg_drake.app.cli import main
+from riseg_drake.stations.ground_truth import LABEL_CHANNEL, decode_labels
+from riseg_drake.stations.lcm_images import decode_images
+from riseg_drake.stations.misbehaviour import CONTROL_CHANNEL
+from riseg_drake.stations.panda_driver import MOVE, REFLEX
+
+DEADLINE = 60.0  # s, for anything that is waited for
+
+
+class Client:
+    """What stands on the other side of the network."""
+
+    def __init__(self, url):
+        self.lcm = DrakeLcm(url)
+        self.statuses = self.pictures = 0
+        self.status = self.picture = self.labels = None
+        self.lcm.Subscribe("PANDA_STATUS", self._on_status)
+        self.lcm.Subscribe("DRAKE_RGBD_CAMERA_IMAGES_emulated", self._on_picture)
+        self.lcm.Subscribe(LABEL_CHANNEL, self._on_labels)
+
+    def _on_status(self, raw):
+        self.status = lcmt_panda_status.decode(raw)
+        self.statuses += 1
+
+    def _on_picture(self, raw):
+        self.picture = lcmt_image_array.decode(raw)
+        self.pictures += 1
+
+    def _on_labels(self, raw):
+        self.labels = lcmt_image_array.decode(raw)
+
+    def until(self, condition, each_time=lambda: None):
+        deadline = time.monotonic() + DEADLINE
+        while not condition():
+            assert time.monotonic() < deadline, "nothing came before the deadline"
+            each_time()
+            self.lcm.HandleSubscriptions(5)
+
+    def command(self, q, mode=1):
+        message = lcmt_panda_command()
+        message.utime, message.control_mode_expected = int(1e6 * time.time()), mode
+        message.num_joint_position, message.joint_position = 7, list(q)
+        self.lcm.Publish("PANDA_COMMAND", message.encode())
+
+    def move(self, dq, speed=0.04):
+        """Move all joints by dq, rad, slowly; from anew where this process was kept waiting."""
+        goal = np.array(self.status.joint_position_desired) + dq
+        q, last, v = np.array(self.status.joint_position_desired), time.time(), 0.0
+
+        def step():
+            nonlocal q, last, v
+            gap, last = time.time() - last, time.time()
+            if gap > 0.05:
+                q, v = np.array(self.status.joint_position_desired), 0.0
+                gap = 0.005
+            v = min(speed, v + 0.5 * gap, np.sqrt(2 * 0.5 * np.abs(goal - q).max()))
+            q = q + np.clip(goal - q, -v * gap, v * gap)
+            self.command(q)
+
+        self.until(lambda: np.abs(np.array(self.status.joint_position) - goal).max() < 1e-3, step)
+
+
+@pytest.fixture
+def emulator(tmp_path):
+    """A running `riseg emulate`, a client, and the scenario of both; alone on a port of their own."""
+    url = f"udpm://239.255.76.67:{20000 + os.getpid() % 20000}?ttl=0&recv_buf_size=4194304"
+    scenario = tmp_path / "one_toy.yaml"
+    scenario.write_text(
+        f"station: {{scene: {{count_min: 1, count_max: 1}}}}\nemulator: {{lcm: {{url: '{url}'}}, rate: 5.0}}\n"
+    )
+    client = Client(url)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "riseg_drake", "emulate", str(scenario), "--fault", "images duplicate 0.2"],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        yield client, process, scenario
+    finally:
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.renders
+def test_a_client_moves_the_arm_sees_pictures_and_is_taught_manners(emulator):
+    client, process, scenario = emulator
+    client.until(lambda: client.status and client.picture and client.labels)
+    images = decode_images(client.picture)
+    assert images.color.shape == (480, 848, 3)
+    assert (images.depth > 0).mean() > 0.8
+    assert decode_labels(client.labels).labels.max() == 1
+    assert images.time == pytest.approx(client.status.utime * 1e-6, abs=DEADLINE)
+
+    assert client.status.robot_mode == MOVE
+    client.move(np.full(7, 0.02))
+    assert client.status.robot_mode == MOVE
+    client.until(lambda: client.status.robot_mode == REFLEX, lambda: client.command(np.zeros(7)))
+    assert main(["emulate", str(scenario), "--say", "recover"]) == 0
+    client.until(lambda: client.status.robot_mode == MOVE)
+
+    q = client.status.joint_position_desired
+    client.until(lambda: process.poll() is not None, lambda: client.command(q, mode=2))
+    out, err = process.communicate()
+    assert process.returncode == 2
+    assert err.splitlines() == [
+        "riseg: control_mode_expected is 2, but the driver runs with --control_mode=position, which is 1"
+    ]
+    assert "robot_mode is 4 (joint_motion_generator_velocity_discontinuity)" in " ".join(out.split())
+
+
+@pytest.mark.renders
+def test_ctrl_c_ends_both_processes_and_says_the_rates(emulator):
+    client, process, _ = emulator
+    client.until(lambda: client.pictures > 1)
+    process.send_signal(2)
+    out, err = process.communicate(timeout=DEADLINE)
+    assert process.returncode == 0
+    assert err == ""
+    assert "status at" in out
+    assert "pictures at" in out
+
+
+@pytest.mark.parametrize("option", ["--say", "--fault"])
+def test_an_unknown_word_is_refused_with_those_that_are_known(option, capsys):
+    assert main(["emulate", option, "dance"]) == 2
+    error = capsys.readouterr().err
+    assert "'dance' is not known to the emulator; it knows images|status drop" in error
+    assert error.count("\n") == 1
+
+
+def test_a_word_is_said_on_the_control_channel(tmp_path):
+    url = f"udpm://239.255.76.67:{40000 + os.getpid() % 20000}?ttl=0"
+    scenario = tmp_path / "s.yaml"
+    scenario.write_text(f"emulator: {{lcm: {{url: '{url}'}}}}\n")
+    lcm, heard = DrakeLcm(url), []
+    lcm.Subscribe(CONTROL_CHANNEL, heard.append)
+    lcm.HandleSubscriptions(0)
+    assert main(["emulate", str(scenario), "--say", "images drop 0.1"]) == 0
+    lcm.HandleSubscriptions(1000)
+    assert heard == [b"images drop 0.1"]
