@@ -94,6 +94,35 @@ def _parser() -> argparse.ArgumentParser:
         help="also record the runs, and segment them as the paper has it, one switch at a time",
     )
 
+    hardware = _add(
+        commands,
+        "hardware",
+        _hardware,
+        "The same on a real Panda with a RealSense camera, by way of their drivers on LCM; see docs/hardware.md.\n"
+        "The operator confirms every push; --dry-run shows pushes and moves nothing.",
+    )
+    hardware.add_argument(
+        "scenario", type=Path, nargs="?", metavar="SCENARIO", help="a YAML file (the built-in hardware.yaml)"
+    )
+    hardware.add_argument("--seed", type=int, default=0, metavar="N", help="draws samples (0)")
+    hardware.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/SCENARIO_TIME)")
+    hardware.add_argument("--record", action="store_true", help="also write every frame to DIR/recording")
+    hardware.add_argument(
+        "--meshcat", action=argparse.BooleanOptionalAction, default=False, help="show it in the browser (no)"
+    )
+    hardware.add_argument(
+        "--dry-run", action="store_true", help="show every planned push in the browser, and move nothing"
+    )
+    hardware.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
+    hardware.add_argument(
+        "--truth", action="store_true", help="score the masks by the ground truth of `riseg emulate`"
+    )
+    hardware.add_argument(
+        "--replayed",
+        action="store_true",
+        help="hear a log that lcm-logplayer plays: old time stamps count as new, nothing is moved",
+    )
+
     emulate = _add(
         commands,
         "emulate",
@@ -202,6 +231,23 @@ def _evaluate(chosen: argparse.Namespace, console: Console) -> None:
     )
 
 
+def _hardware(chosen: argparse.Namespace, console: Console) -> None:
+    from riseg_drake.app.hardware import hardware_command
+
+    hardware_command(
+        chosen.scenario,
+        chosen.seed,
+        chosen.output,
+        chosen.record,
+        chosen.meshcat,
+        chosen.dry_run,
+        chosen.yes,
+        chosen.truth,
+        chosen.replayed,
+        console,
+    )
+
+
 def _emulate(chosen: argparse.Namespace, console: Console) -> None:
     from riseg_drake.app.emulate import emulate_command
 
@@ -228,14 +274,18 @@ def _diagram(chosen: argparse.Namespace, console: Console) -> None:
 
 def _mistakes() -> tuple[type[Exception], ...]:
     """The errors that tell a person what to do otherwise; any other is a fault of this program."""
+    from riseg_drake.app.arm_travel import TravelError
     from riseg_drake.app.evaluate import EvaluationError
     from riseg_drake.app.graphics import NoGraphicsError
+    from riseg_drake.app.hardware import HardwareError
     from riseg_drake.app.output import OutputError
     from riseg_drake.app.scenario_file import ScenarioError
     from riseg_drake.app.scene_pool import ClusterError
     from riseg_drake.evaluation.label_folders import LabelFolderError
     from riseg_drake.recording.layout import RecordingError
+    from riseg_drake.stations.command_process import CommandError
     from riseg_drake.stations.lcm_channels import LcmError
+    from riseg_drake.stations.lcm_images import ImageError
     from riseg_drake.stations.misbehaviour import WordError
     from riseg_drake.stations.panda_driver import DriverEndedError
     from riseg_drake.stations.scene import SceneError
@@ -250,6 +300,10 @@ def _mistakes() -> tuple[type[Exception], ...]:
         EvaluationError,
         ClusterError,
         LcmError,
+        ImageError,
+        CommandError,
+        HardwareError,
+        TravelError,
         WordError,
         DriverEndedError,
     )

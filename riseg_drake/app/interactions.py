@@ -43,7 +43,7 @@ class WallClock:
 
     start: float
     """Wall time now, s: the diagram's time at the start."""
-    look: Callable[[], bool]
+    look: Callable[[Context], bool]
     """Called after every step; true stops the diagram for a moment, to look at `Progress.end`."""
 
 
@@ -135,7 +135,7 @@ class _News:
     frame: Frame
     """I_t of the newest mask; not there before the first."""
 
-    def __init__(self, wired: WiredDiagram, look: Callable[[], bool] | None):
+    def __init__(self, wired: WiredDiagram, look: Callable[[Context], bool] | None):
         self._look = look
         self.phase = ArmPhase.OBSERVE
         self.mask_is_new = False
@@ -144,10 +144,11 @@ class _News:
 
     def look(self, context: Context) -> EventStatus:
         """The simulator's monitor; it is called after every step, hundreds of times a second."""
+        wanted = self._look is not None and self._look(context)
         phase = self._wired.phase(context)
         sequence = self._wired.segmentation(context).sequence
         if phase is self.phase and sequence == self._sequence:
-            if self._look is not None and self._look():
+            if wanted:
                 return EventStatus.ReachedTermination(self._wired.diagram, "somebody wants to look")
             return EventStatus.DidNothing()
         if sequence != self._sequence:

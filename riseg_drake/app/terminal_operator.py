@@ -3,6 +3,7 @@
 import queue
 import sys
 import threading
+import time
 from typing import TextIO
 
 from rich.console import Console
@@ -27,21 +28,20 @@ class TerminalOperator:
         self._lines: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._question = ""
         self._reader: threading.Thread | None = None
+        self._closed = False
 
     def answer(self, question: str, choices: str) -> str:
         """One of the letters in `choices`, or "" while there is no answer; the question is printed once."""
         if question != self._question:
             self._question = question
             self._start_reading()
-            while not self._lines.empty():  # typed before it was asked
-                if self._lines.get() == QUIT:
-                    self._lines.put(QUIT)
-                    break
+            while not self._lines.empty():  # typed before it was asked: meant for something else
+                self._lines.get()
             self._console.print(question, highlight=False)
         try:
             said = self._lines.get_nowait()
         except queue.Empty:
-            return ""
+            return QUIT if self._closed else ""
         if said not in choices.split():
             self._console.print(f"please answer one of {choices}, and press Enter")
             return ""
@@ -60,6 +60,31 @@ class TerminalOperator:
         )
         return {"": Permission.WAIT, "y": Permission.DO, "n": Permission.SKIP}.get(said, Permission.END)
 
+    def confirm(self, question: str) -> None:
+        """Wait for a yes. Raises KeyboardInterrupt for anything else."""
+        if self._consents:
+            self._console.print(question, highlight=False)
+            return
+        while not (said := self.answer(f"{question}: y to go, q to end", f"y {QUIT}")):
+            time.sleep(0.05)
+        if said != "y":
+            raise KeyboardInterrupt
+
+    def released(self, stop: str) -> bool | None:
+        """Whether the arm may move again after a stop; None while there is no answer.
+
+        Who consented to pushes in advance did not consent to this.
+        """
+        if self._consents:
+            self._console.print(stop, highlight=False)
+            return False
+        said = self.answer(f"{stop}: g to go on once that is mended, q to end", f"g {QUIT}")
+        return None if not said else said == "g"
+
+    def tell(self, text: str) -> None:
+        """Say something that needs no answer."""
+        self._console.print(text, highlight=False)
+
     def _start_reading(self) -> None:
         if self._reader is None:
             self._reader = threading.Thread(target=self._read, name="terminal", daemon=True)
@@ -68,4 +93,4 @@ class TerminalOperator:
     def _read(self) -> None:
         for line in self._terminal:
             self._lines.put(line.strip().lower())
-        self._lines.put(QUIT)
+        self._closed = True

@@ -65,6 +65,7 @@ class Cause(Enum):
     NOT_FOLLOWING = "the arm is not where it was told to be"
     GAP = "the motion asked for begins somewhere else"
     INTERRUPT = "Ctrl-C"
+    FINISHED = "the program is done"
     CLIENT_GONE = "the program that plans the motion is gone"
 
 

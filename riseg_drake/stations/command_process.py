@@ -240,7 +240,7 @@ def _obey(connection: Connection, stream: CommandStream) -> str:
                 case "release":
                     stream.release()
                 case "end":
-                    stream.end(Cause.INTERRUPT)
+                    stream.end(Cause.FINISHED)
     except ValueError as error:
         refused = str(error)
     except (EOFError, OSError):

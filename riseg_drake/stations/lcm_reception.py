@@ -14,8 +14,9 @@ from riseg_drake.robot.command_stream import ArmStatus
 from riseg_drake.robot.position_history import PositionHistory
 from riseg_drake.stations.lcm_channels import LcmConfig
 
-POLL = 0.002
-"""Time between two looks for messages, s. Waiting inside LCM would keep Python's lock."""
+POLL = 0.01
+"""Time between two looks for messages, s. Waiting inside LCM would keep Python's lock, and looking more often
+would take it from the segmentation again and again; of the status one in ten is enough for a straight line."""
 KEPT_PICTURES = 4
 """Undecoded pictures kept, half a megabyte each."""
 
