@@ -10,7 +10,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -23,11 +23,11 @@ from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.stations.emulated_arm import TICK_US, EmulatedArm
 from riseg_drake.stations.emulated_camera import EmulatedCamera
-from riseg_drake.stations.emulated_drivers import CameraSide, Moment, PandaSide
+from riseg_drake.stations.emulated_drivers import CameraSide, EmulatorConfig, Moment, PandaSide
 from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm, receive_buffer_warning
 from riseg_drake.stations.misbehaviour import CONTROL_CHANNEL, WORDS, WordError, parse_word
 
-_GIVE_WAY = 5  # niceness of the camera's process: pictures can wait, the arm's status cannot
+_GIVE_WAY = 2  # niceness of the camera's process: the status comes first, but pictures must not starve
 _LONGEST_WAIT = 0.05  # s, until the camera's process listens for words again
 
 
@@ -53,26 +53,31 @@ def emulate_command(
     warning = receive_buffer_warning(config.lcm.url)
     if warning:
         console.print(f"[yellow]{warning}")
-    name = scenario_name(scenario_file)
-    with console.status("placing the objects"), _camera_process(scenario_file, seed) as camera:
-        _run(scenario, seed, camera, faults, f"{name}, seed {seed}", console)
+    with _camera_process(scenario_file, seed) as camera:
+        with console.status("placing the objects"):
+            arm = _place(scenario, seed)
+            complaint = camera.recv()
+        if complaint:
+            raise ScenarioError(complaint)
+        console.print(
+            f"{scenario_name(scenario_file)}, seed {seed}: {config.lcm.status_channel} and "
+            f"{config.lcm.image_channel} on {config.lcm.url}, --control_mode={config.driver.control_mode}; "
+            "Ctrl-C ends it"
+        )
+        _run(PandaSide(open_lcm(config.lcm), config, arm, seed), config, camera, faults, console)
+
+
+def _place(scenario: Scenario, seed: int) -> EmulatedArm:
+    try:
+        return EmulatedArm(scenario.simulated, scenario.emulator.driver, seed, _wall_us())
+    except (ValueError, RuntimeError) as error:
+        raise ScenarioError(" ".join(str(error).split())) from error
 
 
 def _run(
-    scenario: Scenario, seed: int, camera: Connection, faults: Sequence[str], title: str, console: Console
+    side: PandaSide, config: EmulatorConfig, camera: Connection, faults: Sequence[str], console: Console
 ) -> None:
-    config = scenario.emulator
-    lcm = open_lcm(config.lcm)
-    try:
-        arm = EmulatedArm(scenario.simulated, config.driver, seed, _wall_us())
-    except (ValueError, RuntimeError) as error:
-        raise ScenarioError(" ".join(str(error).split())) from error
-    side = PandaSide(lcm, config, arm, seed)
-    camera.recv()  # it is ready
-    console.print(
-        f"{title}: {config.lcm.status_channel} and {config.lcm.image_channel} on {config.lcm.url}, "
-        f"--control_mode={config.driver.control_mode}; Ctrl-C ends it"
-    )
+    """Keep time until Ctrl-C, and say then what rates were reached."""
     for word in faults:
         open_lcm(config.lcm).Publish(CONTROL_CHANNEL, word.encode())
     if _may_read_terminal():
@@ -113,7 +118,7 @@ def _keep_time(side: PandaSide, camera: Connection, period: float, console: Cons
 
 @contextmanager
 def _camera_process(scenario_file: Path | None, seed: int) -> Iterator[Connection]:
-    """The camera's process for the time of a `with`; it first says that it is ready."""
+    """The camera's process for the time of a `with`; it first says "", or why it cannot be."""
     spawn = get_context("spawn")
     here, there = spawn.Pipe()
     process = spawn.Process(target=_draw, args=(there, scenario_file, seed), daemon=True)
@@ -131,13 +136,17 @@ def _draw(commands: Connection, scenario_file: Path | None, seed: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the other process's to hear
     os.nice(_GIVE_WAY)
     scenario = load_scenario(scenario_file)
-    side = CameraSide(
-        open_lcm(scenario.emulator.lcm), scenario.emulator, EmulatedCamera(scenario.simulated, seed), seed
-    )
-    commands.send("ready")
+    try:
+        eye = EmulatedCamera(scenario.simulated, seed)
+    except (ValueError, RuntimeError) as error:
+        with suppress(BrokenPipeError):
+            commands.send(" ".join(str(error).split()))
+        return
+    side = CameraSide(open_lcm(scenario.emulator.lcm), scenario.emulator, eye, seed)
     gc.collect()
     gc.freeze()
-    try:
+    with suppress(EOFError, BrokenPipeError):  # where the other process is gone
+        commands.send("")
         while True:
             wait = side.flush(time()) - time()
             if not commands.poll(max(0.0, min(wait, _LONGEST_WAIT))):
@@ -149,8 +158,6 @@ def _draw(commands: Connection, scenario_file: Path | None, seed: int) -> None:
                 break
             side.show(moment, time())
         commands.send(side.published)
-    except EOFError:  # the other process is gone
-        return
 
 
 def _pass_on(config: LcmConfig, console: Console) -> None:

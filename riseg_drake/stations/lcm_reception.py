@@ -35,9 +35,9 @@ def status_of(message: lcmt_panda_status) -> ArmStatus:
 def array_time(data: bytes) -> float:
     """The stamp of an encoded lcmt_image_array, s, without decoding its pictures.
 
-    It follows LCM's fingerprint and the sequence number, of 8 bytes each.
+    It follows LCM's fingerprint of 8 bytes and the sequence number of 4.
     """
-    (utime,) = struct.unpack_from(">q", data, 16)
+    (utime,) = struct.unpack_from(">q", data, 12)
     return utime * 1e-6
 
 

@@ -134,6 +134,17 @@ def test_ctrl_c_ends_both_processes_and_says_the_rates(emulator):
     assert "pictures at" in out
 
 
+@pytest.mark.renders
+def test_a_scene_that_cannot_be_is_said_once_in_one_line(tmp_path):
+    scenario = tmp_path / "none.yaml"
+    scenario.write_text("station: {scene: {count_min: 0}}\n")
+    ended = subprocess.run(
+        [sys.executable, "-m", "riseg_drake", "emulate", str(scenario)], capture_output=True, text=True
+    )
+    assert ended.returncode == 2
+    assert ended.stderr == "riseg: count_min, count_max: 0, 6; expected 1 <= min <= max\n"
+
+
 @pytest.mark.parametrize("option", ["--say", "--fault"])
 def test_an_unknown_word_is_refused_with_those_that_are_known(option, capsys):
     assert main(["emulate", option, "dance"]) == 2
