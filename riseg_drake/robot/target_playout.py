@@ -34,6 +34,9 @@ class TargetPlayout:
     `time` is what is played out now, s, None before the first target; `rate` how fast it goes, 0 to 1.
     """
 
+    RESERVE = 0.03
+    """The clock stands still this long before the last target, s: the motion beyond is not known yet."""
+
     def __init__(self, parameters: PlayoutParameters | None = None):
         self._parameters = parameters or PlayoutParameters()
         self._times: deque[float] = deque()
@@ -73,12 +76,12 @@ class TargetPlayout:
         """Go on by one period; what to be at then, or None before the first target."""
         if self.time is None:
             return None
-        wanted = float(np.sqrt(2 * self._parameters.slope * max(self.remaining - 2 * period, 0.0)))
+        wanted = float(np.sqrt(2 * self._parameters.slope * max(self.remaining - self.RESERVE, 0.0)))
         change = self._parameters.slope * period
         self.rate = float(np.clip(min(wanted, 1.0), self.rate - change, self.rate + change))
         self.time = min(self.time + self.rate * period, self._times[-1])
-        if not self.in_motion:  # nothing is lost by going to where the clock should be
-            self.time = max(self.time, self._times[-1] - self._parameters.delay)
+        if not self.in_motion:  # at rest nothing is lost, or seen, by going to where the clock should be
+            self.time = max(self._last_change, self._times[-1] - self._parameters.delay)
         self._forget()
         return self._at(self.time)
 
