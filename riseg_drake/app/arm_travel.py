@@ -15,6 +15,8 @@ from riseg_drake.stations.hardware import TARGET_PERIOD
 
 ARRIVED = 0.01
 """The arm is where it should be when every joint is this close, rad."""
+LINGER = 1.0
+"""Targets go on for this long at the end of a motion, s: the last ones are never reached."""
 ROOM = 0.01
 """Arm and tool keep this far from the table and from each other on the way, m."""
 
@@ -47,8 +49,8 @@ def travel(
     Raises TravelError if the arm is stopped on its way.
     """
     start, duration = time.time(), motion.end_time()
-    for t in [*np.arange(0, duration, TARGET_PERIOD), duration]:
-        commands.send_target(start + t, motion.value(t)[:, 0])
+    for t in np.arange(0, duration + LINGER, TARGET_PERIOD):
+        commands.send_target(start + t, motion.value(min(t, duration))[:, 0])
     goal = motion.value(duration)[:, 0]
     deadline = time.monotonic() + duration + 15
     while time.monotonic() < deadline:
@@ -60,7 +62,7 @@ def travel(
         if report.state.mode in (Mode.STOPPED, Mode.ENDED):
             raise TravelError(f"the arm was stopped: {report.state.cause.value}")
         arrived = report.status is not None and np.abs(report.status.position - goal).max() < ARRIVED
-        if arrived and report.behind == 0 and report.at_rest and time.time() > start + duration:
+        if arrived and report.behind == 0 and report.at_rest and time.time() > start + duration + LINGER:
             return
     cause = report.state.cause.value or "it did not arrive in time" if report else "it says nothing"
     raise TravelError(f"the arm did not get to where it should: {cause}")

@@ -232,6 +232,8 @@ def _evaluate(chosen: argparse.Namespace, console: Console) -> None:
 
 
 def _hardware(chosen: argparse.Namespace, console: Console) -> None:
+    # Threads that wait for each other busily take the processor from the drivers and from the commands.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     from riseg_drake.app.hardware import hardware_command
 
     hardware_command(

@@ -41,6 +41,8 @@ FINAL_COMMANDS = 20
 """How many commands at rest end the stream: zeros, in velocity mode."""
 REPORT_EVERY = 4
 """A report every so many periods."""
+MOST_PERIODS = 4
+"""The trajectory makes up for this many periods at most; after a longer gap it is slower for a moment."""
 MOST_MESSAGES = 200
 """Read from the pipe in one period at most; the rest waits for the next."""
 
@@ -197,13 +199,17 @@ def stream_commands(
     connection.send("ready")
     sent: deque[float] = deque(maxlen=1_000_000)
     period, refused, rounds, final = 1 / parameters.rate, "", 0, 0
-    due = time.monotonic()
+    due, before = time.monotonic(), time.monotonic() - period
     while final < FINAL_COMMANDS:
         refused = _obey(connection, stream) or refused
         if interrupted.is_set():
             stream.end(Cause.INTERRUPT)
-        status, now = news.read(), time.time()
-        command = stream.step(now, status, news.image_time)
+        status, now, start = news.read(), time.time(), time.monotonic()
+        # After a delay the trajectory goes on to where it should be by now, if that is not far: its speed is
+        # the arm's, by the stamps of the commands.
+        for _ in range(min(max(round((start - before) / period), 1), MOST_PERIODS)):
+            command = stream.step(now, status, news.image_time)
+        before = start
         if command is not None:
             now = time.time()
             news.lcm.Publish(lcm.command_channel, command_message(command, parameters.mode, now).encode())
@@ -213,10 +219,7 @@ def stream_commands(
         rounds += 1
         if rounds % REPORT_EVERY == 0:
             _tell(connection, StreamReport(stream.state, stream.position, status, stream.behind, stream.at_rest, refused))
-        # One command a period even after a delay: a step is never made up for by a larger or a faster one.
-        due = max(due + period, time.monotonic() + 0.8 * period) if time.monotonic() < due + period else (
-            time.monotonic() + period
-        )
+        due = max(due + period, start + period / 2)  # after a delay no two commands at once
         time.sleep(max(due - time.monotonic(), 0.0))
     with suppress(OSError):
         connection.send(StreamReport(stream.state, stream.position, news.read(), stream.behind, True, refused))
