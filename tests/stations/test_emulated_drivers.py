@@ -212,9 +212,8 @@ class Eye:
         self.config = EmulatorConfig(**config)
         self.station = one_toy()
         self.station.camera.noise.enabled = False
-        camera = EmulatedCamera(self.station, seed=0)
-        self.positions = camera._plant.GetPositions(camera._plant_context)
-        self.side = CameraSide(self.lcm, self.config, camera, seed=0)
+        self.positions = EmulatedArm(self.station, self.config.driver, 0, WALL).positions()
+        self.side = CameraSide(self.lcm, self.config, EmulatedCamera(self.station, seed=0), seed=0)
         self.heard = {}
         for channel, kind in (
             (self.config.lcm.image_channel, lcmt_image_array),
