@@ -123,6 +123,19 @@ def _parser() -> argparse.ArgumentParser:
         help="hear a log that lcm-logplayer plays: old time stamps count as new, nothing is moved",
     )
 
+    hand_eye = _add(
+        commands,
+        "hand-eye",
+        _hand_eye,
+        "Move a real arm a little over a scene that stands still, and compare expected with observed flow.\n"
+        "Says in pixels how well the camera's pose on the arm is known, and where the table is.",
+    )
+    hand_eye.add_argument(
+        "scenario", type=Path, nargs="?", metavar="SCENARIO", help="a YAML file (the built-in hardware.yaml)"
+    )
+    hand_eye.add_argument("--output", type=Path, metavar="DIR", help="folder for pictures (out/hand_eye)")
+    hand_eye.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
+
     emulate = _add(
         commands,
         "emulate",
@@ -248,6 +261,13 @@ def _hardware(chosen: argparse.Namespace, console: Console) -> None:
         chosen.replayed,
         console,
     )
+
+
+def _hand_eye(chosen: argparse.Namespace, console: Console) -> None:
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    from riseg_drake.app.hand_eye import hand_eye_command
+
+    hand_eye_command(chosen.scenario, chosen.output, chosen.yes, console)
 
 
 def _emulate(chosen: argparse.Namespace, console: Console) -> None:

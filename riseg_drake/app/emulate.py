@@ -26,6 +26,7 @@ from riseg_drake.stations.emulated_camera import EmulatedCamera
 from riseg_drake.stations.emulated_drivers import CameraSide, EmulatorConfig, Moment, PandaSide
 from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm, receive_buffer_warning
 from riseg_drake.stations.misbehaviour import CONTROL_CHANNEL, WORDS, WordError, parse_word
+from riseg_drake.stations.promptness import be_prompt
 
 _GIVE_WAY = 2  # niceness of the camera's process: the status comes first, but pictures must not starve
 _LONGEST_WAIT = 0.05  # s, until the camera's process listens for words again
@@ -84,8 +85,7 @@ def _run(
         if sys.stdin.isatty():
             console.print(f"you may type: {WORDS}")
         threading.Thread(target=_pass_on, args=(config.lcm, console), daemon=True).start()
-    gc.collect()
-    gc.freeze()  # what is there stays there: no pauses to look through it
+    be_prompt(PRIORITY)  # as the real arm, which has a computer of its own
     start = time()
     try:
         _keep_time(side, camera, 1 / config.rate, console)

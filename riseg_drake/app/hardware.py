@@ -129,9 +129,7 @@ def wait_for_drivers(reception: Reception, config: HardwareStationConfig, patien
         missing.append(f"{config.lcm.status_channel} (is drake-franka-driver running?)")
     if not reception.pictures:
         missing.append(f"{config.lcm.image_channel} (is realsense_rgbd_publisher running, with that serial?)")
-    raise HardwareError(
-        f"nothing came on {' nor on '.join(missing)} within {patience:g} s at {config.lcm.url}"
-    )
+    raise HardwareError(f"nothing came on {' nor on '.join(missing)} within {patience:g} s at {config.lcm.url}")
 
 
 class _Session:
@@ -231,7 +229,9 @@ class _Session:
     def _observation_posture(self, kinematics: PandaKinematics) -> np.ndarray:
         config = self._config
         try:
-            return observation_posture(kinematics, config.centre_W, config.observe_height, config.start_position)
+            return observation_posture(
+                kinematics, config.centre_W, config.observe_height, config.start_position
+            )
         except ValueError as error:
             raise ScenarioError(str(error)) from None
 
@@ -242,7 +242,9 @@ class _Session:
             return
         motion = straight_motion(kinematics, here, q, self._scenario.push.path.limits)
         turn = np.degrees(np.abs(q - here).max())
-        self._operator.confirm(f"the arm goes to where it looks from, {turn:.0f} degrees in {motion.end_time():.1f} s")
+        self._operator.confirm(
+            f"the arm goes to where it looks from, {turn:.0f} degrees in {motion.end_time():.1f} s"
+        )
         travel(commands, motion)
 
     def _is_over(self) -> bool:

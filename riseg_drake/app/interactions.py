@@ -118,9 +118,7 @@ def interactions(
 
 def simulated_truth(wired: WiredDiagram) -> TruthSource:
     """The truth that a simulated station knows."""
-    return lambda _, context: Truth(
-        wired.true_labels(context), wired.true_poses(context), wired.object_names
-    )
+    return lambda _, context: Truth(wired.true_labels(context), wired.true_poses(context), wired.object_names)
 
 
 class _Seen(NamedTuple):

@@ -44,7 +44,9 @@ class CommandLimits:
         for name in ("velocity", "acceleration", "jerk", "stop_acceleration", "stop_jerk"):
             share = getattr(self, name)
             if not 0 < share <= 1:
-                raise ValueError(f"{name} is a share of the arm's limit, more than 0 and at most 1, not {share}")
+                raise ValueError(
+                    f"{name} is a share of the arm's limit, more than 0 and at most 1, not {share}"
+                )
         if self.stop_acceleration < self.acceleration or self.stop_jerk < self.jerk:
             raise ValueError("a stop must be allowed at least the acceleration and jerk of other motions")
 

@@ -143,7 +143,9 @@ class CommandStream:
         if self.state.mode is not Mode.ENDED:
             self.state = ended(cause)
 
-    def step(self, now: float, status: ArmStatus | None, image_time: float | None) -> NDArray[np.float64] | None:
+    def step(
+        self, now: float, status: ArmStatus | None, image_time: float | None
+    ) -> NDArray[np.float64] | None:
         """The command of one period: joint angles or velocities [7] by mode; None while there is none."""
         could_move = self.state.may_move
         target = self._playout.advance(self._period) if could_move else None
@@ -191,7 +193,9 @@ class CommandStream:
             p_WE=self._tip.position(rest),
             held_back=limiter is not None and limiter.held_back,
             lag=0.0 if limiter is None else _largest(measured - (limiter.position - self._drift)),
-            gap=0.0 if limiter is None or target is None else _largest(target.position + self._drift - limiter.position),
+            gap=0.0
+            if limiter is None or target is None
+            else _largest(target.position + self._drift - limiter.position),
         )
 
     def _correct_drift(self, status: ArmStatus | None) -> None:

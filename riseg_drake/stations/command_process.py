@@ -7,9 +7,7 @@ before one that computes. It hears the arm and the camera itself, and gets targe
 that they are meant for; if the pipe breaks, or Ctrl-C comes, it brings the arm to rest.
 """
 
-import gc
 import multiprocessing
-import os
 import select
 import signal
 import threading
@@ -36,11 +34,14 @@ from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.robot.supervisor import Cause, Mode, SafetyState
 from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm
 from riseg_drake.stations.lcm_reception import array_time, status_of
+from riseg_drake.stations.promptness import be_prompt
 
 FINAL_COMMANDS = 20
 """How many commands at rest end the stream: zeros, in velocity mode."""
 REPORT_EVERY = 4
 """A report every so many periods."""
+PRIORITY = 20
+"""Among real-time processes, where the system allows that."""
 MOST_PERIODS = 4
 """The trajectory makes up for this many periods at most; after a longer gap it is slower for a moment."""
 MOST_MESSAGES = 200
@@ -128,7 +129,9 @@ class CommandProcess:
                     self._take(self._receive())
             except (EOFError, OSError):
                 if not len(self.send_times):
-                    raise CommandError("the process that sends commands died; the arm holds or stops by itself") from None
+                    raise CommandError(
+                        "the process that sends commands died; the arm holds or stops by itself"
+                    ) from None
         return self._report
 
     def close(self, patience: float = 3.0) -> None:
@@ -195,7 +198,7 @@ def stream_commands(
     tip = TipGeometry(lambda q: kinematics.X_WE(q)[:3, 3], kinematics.tip_jacobian)
     stream = CommandStream(parameters, tip)
     news = _News(lcm)
-    _be_prompt()
+    be_prompt(PRIORITY)
     connection.send("ready")
     sent: deque[float] = deque(maxlen=1_000_000)
     period, refused, rounds, final = 1 / parameters.rate, "", 0, 0
@@ -218,7 +221,10 @@ def stream_commands(
             final = final + 1 if command is not None else FINAL_COMMANDS
         rounds += 1
         if rounds % REPORT_EVERY == 0:
-            _tell(connection, StreamReport(stream.state, stream.position, status, stream.behind, stream.at_rest, refused))
+            _tell(
+                connection,
+                StreamReport(stream.state, stream.position, status, stream.behind, stream.at_rest, refused),
+            )
         due = max(due + period, start + period / 2)  # after a delay no two commands at once
         time.sleep(max(due - time.monotonic(), 0.0))
     with suppress(OSError):
@@ -256,12 +262,3 @@ def _tell(connection: Connection, report: StreamReport) -> None:
     with suppress(OSError, ValueError):
         if select.select([], [connection], [], 0)[1]:
             connection.send(report)
-
-
-def _be_prompt() -> None:
-    """Nothing that could take long in between, and the first turn on the processor where that is allowed."""
-    gc.collect()
-    gc.freeze()
-    gc.disable()
-    with suppress(PermissionError, OSError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))

@@ -97,9 +97,7 @@ def stopping_time(arm):
 def within_limits(commands, limits=CommandLimits()):
     """Whether positions [N, 7] at even periods, from rest, keep the limits of motion and stop."""
     padded = np.vstack([commands[:1]] * 3 + [commands])
-    v, a, j = (
-        np.abs(np.diff(padded, order, axis=0)).max(axis=0) / PERIOD**order for order in (1, 2, 3)
-    )
+    v, a, j = (np.abs(np.diff(padded, order, axis=0)).max(axis=0) / PERIOD**order for order in (1, 2, 3))
     return (
         (v <= limits.velocity * PANDA_LIMITS.velocity * (1 + 1e-6) + 1e-9).all()
         and (a <= limits.stop_acceleration * PANDA_LIMITS.acceleration * (1 + 1e-6) + 1e-6).all()
@@ -279,9 +277,8 @@ def random_trial(seed):
     arm = Arm()
     arm.parameters.playout.delay = rng.choice([0.05, 0.3])
     start = np.clip(
-        PANDA_LIMITS.position_middle + rng.uniform(-0.6, 0.6, 7), *(
-            PANDA_LIMITS.position_lower + 0.1, PANDA_LIMITS.position_upper - 0.1
-        )
+        PANDA_LIMITS.position_middle + rng.uniform(-0.6, 0.6, 7),
+        *(PANDA_LIMITS.position_lower + 0.1, PANDA_LIMITS.position_upper - 0.1),
     )
     arm.status = replace(arm.status, position=start)
     arm.coming = [start] * 2

@@ -49,7 +49,12 @@ class Bench:
         color = np.full((480, 848, 3), gray, np.uint8)
         metres = np.full((480, 848), depth, np.float32)
         message = encode_images(
-            color, metres if aligned else None, time, sent or time + 0.03, 0, raw_depth=None if aligned else metres
+            color,
+            metres if aligned else None,
+            time,
+            sent or time + 0.03,
+            0,
+            raw_depth=None if aligned else metres,
         )
         self.lcm.Publish(self.config.lcm.image_channel, message.encode())
         self.reception.listen()
