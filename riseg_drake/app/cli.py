@@ -98,7 +98,7 @@ def _parser() -> argparse.ArgumentParser:
         commands,
         "hardware",
         _hardware,
-        "The same on a real Panda with a RealSense camera, by way of their drivers on LCM; see docs/hardware.md.\n"
+        "The same on a real Panda with a RealSense camera, over their drivers on LCM; see docs/hardware.md.\n"
         "The operator confirms every push; --dry-run shows pushes and moves nothing.",
     )
     hardware.add_argument(
@@ -181,6 +181,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_scenario(bench)
     bench.add_argument("--seed", type=int, default=0, metavar="N", help="draws the scene and the noise (0)")
+    bench.add_argument(
+        "--stream",
+        type=_positive,
+        metavar="SECONDS",
+        help="measure instead how evenly commands for a real arm are sent beside the segmentation",
+    )
 
     diagram = _add(
         commands,
@@ -285,7 +291,7 @@ def _score(chosen: argparse.Namespace, console: Console) -> None:
 def _bench(chosen: argparse.Namespace, console: Console) -> None:
     from riseg_drake.app.bench import bench_command
 
-    bench_command(chosen.scenario, chosen.seed, console)
+    bench_command(chosen.scenario, chosen.seed, chosen.stream, console)
 
 
 def _diagram(chosen: argparse.Namespace, console: Console) -> None:

@@ -29,6 +29,7 @@ from riseg_drake.stations.misbehaviour import CONTROL_CHANNEL, WORDS, WordError,
 from riseg_drake.stations.promptness import be_prompt
 
 _GIVE_WAY = 2  # niceness of the camera's process: the status comes first, but pictures must not starve
+_PRIORITY = 10  # of the arm's process among real-time ones, where the system allows that
 _LONGEST_WAIT = 0.05  # s, until the camera's process listens for words again
 
 
@@ -85,7 +86,7 @@ def _run(
         if sys.stdin.isatty():
             console.print(f"you may type: {WORDS}")
         threading.Thread(target=_pass_on, args=(config.lcm, console), daemon=True).start()
-    be_prompt(PRIORITY)  # as the real arm, which has a computer of its own
+    be_prompt(_PRIORITY)  # as the real arm, which has a computer of its own
     start = time()
     try:
         _keep_time(side, camera, 1 / config.rate, console)

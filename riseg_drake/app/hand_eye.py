@@ -41,9 +41,7 @@ def hand_eye_command(scenario_file: Path | None, output: Path | None, yes: bool,
         wait_for_drivers(reception, config)
         camera = _Collector(reception, config, kinematics)
         with CommandProcess(config.lcm, config.command, config.panda) as commands:
-            operator.confirm(
-                "the arm goes to its observation posture, and moves 4 cm around it; nothing else may move"
-            )
+            operator.confirm("the arm goes to where it looks from, and 4 cm around; nothing else may move")
             assert reception.status is not None
             here = reception.status.position
             for index, q in enumerate(postures):
@@ -128,8 +126,6 @@ def _postures(kinematics: PandaKinematics, config: HardwareStationConfig) -> lis
             q,
         )
         if traced is None:
-            raise ScenarioError(
-                "centre_W, observe_height: the arm cannot move 4 cm around its observation posture"
-            )
+            raise ScenarioError("centre_W, observe_height: the arm cannot move by 4 cm there")
         postures.append(traced[-1])
     return postures

@@ -1,4 +1,4 @@
-"""How well the camera's pose on the arm is known: expected against observed flow over a scene that stands still.
+"""How well the camera's pose on the arm is known: expected against observed flow over a still scene.
 
 Where nothing moves but the camera, the optical flow is the expected flow (paper, sec. IV-A), and what is left
 between the two is the error of hand-eye pose, latency and intrinsics together, in the unit that counts.
@@ -77,7 +77,7 @@ def verdict(errors: Sequence[FlowError]) -> tuple[float, str]:
 
 
 def draw_flow_error(error: FlowError, step: int = 32, scale: float = 2.0) -> NDArray[np.uint8]:
-    """The picture [H, W, 3] with expected (blue) and observed (orange) flow as arrows, `scale` times as long."""
+    """The picture [H, W, 3] with expected (blue) and observed (orange) flow as arrows, enlarged by `scale`."""
     picture = error.pair.reference.color.copy()
     height, width = error.usable.shape
     for v in range(step // 2, height, step):

@@ -8,7 +8,7 @@ know where the arm is now, which is the process that sends commands, listens to 
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -184,7 +184,7 @@ class LcmView(LeafSystem):
     than that, it shows no newer picture until the diagram has caught up: pictures are skipped, time is not.
     """
 
-    PORTS = {
+    PORTS: ClassVar[dict[str, str]] = {
         "wrist.color_image": "color_image",
         "wrist.depth_image": "depth_image",
         "wrist.image_time": "image_time",
@@ -200,15 +200,18 @@ class LcmView(LeafSystem):
         nothing = _Shown(ImageRgba8U(), ImageDepth32F(), -1.0, -np.inf, np.zeros(7), np.zeros(7))
         self._state = self.DeclareAbstractState(Value[object](nothing))
         ticket = {self.abstract_state_ticket(self._state)}
-        for name, image in (("color_image", ImageRgba8U()), ("depth_image", ImageDepth32F())):
-            self.DeclareAbstractOutputPort(
-                name,
-                lambda image=image: AbstractValue.Make(image),
-                lambda context, output, name=name.partition("_")[0]: output.set_value(
-                    getattr(self._shown(context), name)
-                ),
-                ticket,
-            )
+        self.DeclareAbstractOutputPort(
+            "color_image",
+            lambda: AbstractValue.Make(ImageRgba8U()),
+            lambda context, output: output.set_value(self._shown(context).color),
+            ticket,
+        )
+        self.DeclareAbstractOutputPort(
+            "depth_image",
+            lambda: AbstractValue.Make(ImageDepth32F()),
+            lambda context, output: output.set_value(self._shown(context).depth),
+            ticket,
+        )
         self.DeclareVectorOutputPort("image_time", 1, self._calc_time, ticket)
         self.DeclareVectorOutputPort("position", 7, self._calc_position, ticket)
         self.DeclareVectorOutputPort("velocity", 7, self._calc_velocity, ticket)

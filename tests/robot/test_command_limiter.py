@@ -102,5 +102,5 @@ def test_the_longest_stop_is_no_longer_than_said():
     "wrong", [{"velocity": 0.0}, {"jerk": 1.5}, {"acceleration": 0.9, "stop_acceleration": 0.5}]
 )
 def test_shares_that_cannot_be_are_refused(wrong):
-    with pytest.raises(ValueError, match="share|stop"):
+    with pytest.raises(ValueError, match=r"share|stop"):
         CommandLimits(**wrong)

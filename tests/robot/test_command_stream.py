@@ -1,5 +1,6 @@
 import os
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -59,9 +60,10 @@ class Arm:
         for _ in range(round(seconds / PERIOD)):
             self.step()
 
-    def plan(self, q_to, limits=SpeedLimits(0.3, 0.25, 0.1), linger=1.0):
+    def plan(self, q_to):
+        limits = SpeedLimits(0.3, 0.25, 0.1)
         path = rest_to_rest(np.linspace(self.status.position, q_to, 12), minimum_jerk, limits)
-        for t in np.arange(0, path.end_time() + linger, 0.01):
+        for t in np.arange(0, path.end_time() + 1, 0.01):
             self.stream.add_target(self.now + t, path.value(min(t, path.end_time()))[:, 0])
         return path
 
@@ -89,13 +91,14 @@ def stopping_time(arm):
     else:
         # The last difference that is not zero, from the last command before.
         run = [c for c in arm.commands[first - 1 :] if c is not None]
-        moving = [np.abs(b - a).max() > 1e-9 for a, b in zip(run[:-1], run[1:], strict=True)]
+        moving = [np.abs(b - a).max() > 1e-9 for a, b in pairwise(run)]
     assert not arm.stream.state.may_move
     return PERIOD * (max(np.flatnonzero(moving), default=-1) + 1)
 
 
-def within_limits(commands, limits=CommandLimits()):
+def within_limits(commands):
     """Whether positions [N, 7] at even periods, from rest, keep the limits of motion and stop."""
+    limits = CommandLimits()
     padded = np.vstack([commands[:1]] * 3 + [commands])
     v, a, j = (np.abs(np.diff(padded, order, axis=0)).max(axis=0) / PERIOD**order for order in (1, 2, 3))
     return (

@@ -35,7 +35,7 @@ class Bench:
 
     def status(self, time, position):
         message = lcmt_panda_status()
-        message.utime = int(round(time * 1e6))
+        message.utime = round(time * 1e6)
         message.num_joints = 7
         for name in message.__slots__:
             if name.startswith("joint_"):
@@ -45,14 +45,14 @@ class Bench:
         self.lcm.Publish(self.config.lcm.status_channel, message.encode())
         self.reception.listen()
 
-    def picture(self, time, gray=100, depth=0.5, sent=None, aligned=True):
+    def picture(self, time, gray=100, depth=0.5, aligned=True):
         color = np.full((480, 848, 3), gray, np.uint8)
         metres = np.full((480, 848), depth, np.float32)
         message = encode_images(
             color,
             metres if aligned else None,
             time,
-            sent or time + 0.03,
+            time + 0.03,
             0,
             raw_depth=None if aligned else metres,
         )
@@ -65,8 +65,9 @@ class Bench:
             self.status(time, READY + (time - START))
 
     def advance(self, to):
-        for self.now in [*np.arange(self.context.get_time() + 0.02, to, 0.02), to]:
-            self.simulator.AdvanceTo(self.now)
+        for now in [*np.arange(self.context.get_time() + 0.02, to, 0.02), to]:
+            self.now = now
+            self.simulator.AdvanceTo(now)
 
     def read(self, port):
         value = self.station.GetOutputPort(port).Eval(self.context)
