@@ -11,12 +11,12 @@ from riseg_drake.app.hardware import HardwareError, check_limits, listening, wai
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.terminal_operator import TerminalOperator
-from riseg_drake.evaluation.hand_eye import draw_flow_error, flow_errors, verdict
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.recording.whole_file import write_png
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture, tip_pointing_down
 from riseg_drake.robot.silhouette import RobotSilhouette
 from riseg_drake.segmentation.above_table import objects_above_table
+from riseg_drake.segmentation.hand_eye import draw_flow_error, flow_errors, verdict
 from riseg_drake.stations.command_process import CommandProcess
 from riseg_drake.stations.hardware import HardwareStationConfig, as_drake_images
 from riseg_drake.stations.lcm_images import decode_images

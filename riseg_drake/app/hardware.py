@@ -6,12 +6,14 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import Meshcat, Rgba, StartMeshcat
+from pydrake.geometry import Meshcat, StartMeshcat
 from pydrake.systems.framework import Context
 from rich.console import Console
 
 from riseg_drake.app.arm_travel import ARRIVED, straight_motion, travel
+from riseg_drake.app.arm_watch import ArmWatch
 from riseg_drake.app.diagram import Drivers, WiredDiagram, make_diagram
+from riseg_drake.app.dry_run import DryRun
 from riseg_drake.app.interactions import Listener, Progress, TruthSource, WallClock, interactions
 from riseg_drake.app.output import RECORDING, RunFolder, Step
 from riseg_drake.app.run import Narrator, recorder, report, state_of
@@ -19,10 +21,8 @@ from riseg_drake.app.scenario import HARDWARE, Scenario, load_scenario, scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.terminal_operator import TerminalOperator
 from riseg_drake.app.truth_reception import TruthReception
-from riseg_drake.pushing.push import Push
 from riseg_drake.recording.writer import RecordingWriter
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture
-from riseg_drake.robot.supervisor import Mode
 from riseg_drake.stations.command_process import CommandProcess
 from riseg_drake.stations.hardware import HardwareStationConfig
 from riseg_drake.stations.lcm_channels import open_lcm, receive_buffer_warning
@@ -35,10 +35,6 @@ PATIENCE = 20.0
 """Arm and camera must have been heard after this time, s."""
 SILENCE = 5.0
 """A replayed log is over when nothing has come for this long, s."""
-SHOWN_FOR = 2.0
-"""A dry run shows every push for this long when nobody is asked, s."""
-CONTACT_MARGIN = 0.3
-"""Before and after a push contact is still no surprise, s."""
 
 
 class HardwareError(RuntimeError):
@@ -175,7 +171,7 @@ class _Session:
             if record:
                 writer = stack.enter_context(RecordingWriter(self._folder.path / RECORDING, wired.intrinsics))
                 listeners.append(recorder(wired, writer, self._truth))
-            self._interact(wired, _Watch(wired, commands, self._operator, self._progress), listeners)
+            self._interact(wired, ArmWatch(wired, commands, self._operator, self._progress), listeners)
         if len(commands.send_times) > 1:
             gaps = np.diff(commands.send_times)
             self._folder.note(
@@ -193,7 +189,7 @@ class _Session:
         assert self._reception.status is not None
         # Where the arm stands it looks from.
         self._config.start_position = [float(q) for q in self._reception.status.position]
-        showing = _Showing(self._scenario, self._meshcat, None if unasked else self._operator, self._console)
+        showing = DryRun(self._scenario, self._meshcat, None if unasked else self._operator, self._console)
         with state_of(self._folder, self._progress, self._steps):
             wired = make_diagram(
                 self._scenario,
@@ -255,101 +251,3 @@ class _Session:
         elif time.monotonic() - since > SILENCE:
             self._progress.end = "the log is over"
         return bool(self._progress.end)
-
-
-class _Watch:
-    """Looks after the process that commands the arm, while the diagram runs."""
-
-    PERIOD = 0.02
-    """Time between two looks, s."""
-
-    def __init__(
-        self, wired: WiredDiagram, commands: CommandProcess, operator: TerminalOperator, progress: Progress
-    ):
-        self._wired, self._commands, self._operator, self._progress = wired, commands, operator, progress
-        self._push: Push | None = None
-        self._next = 0.0
-        self._said = Mode.FOLLOWING
-
-    def __call__(self, context: Context) -> bool:
-        """Whether the run has come to its end."""
-        self._announce_contact(context)
-        if time.monotonic() < self._next:
-            return False
-        self._next = time.monotonic() + self.PERIOD
-        report = self._commands.report
-        if report is None:
-            return False
-        state = report.state
-        if state.mode is Mode.STOPPED:
-            self._ask(state.cause.value)
-        elif state.mode is Mode.ENDED or report.refused:
-            self._progress.end = state.cause.value or report.refused
-        elif state.mode is not self._said and state.mode is Mode.PAUSED:
-            self._operator.tell(f"paused: {state.cause.value}")
-        self._said = state.mode
-        return bool(self._progress.end)
-
-    def _announce_contact(self, context: Context) -> None:
-        push: Push | None = self._wired.read("active_push", context)
-        if push is self._push or push is None or push.path is None:
-            return
-        if self._wired.phase(context).value not in ("approach", "push"):
-            return
-        self._push = push
-        start = context.get_time()
-        self._commands.expect_contact(
-            start + push.path.push_start - CONTACT_MARGIN, start + push.path.push_end + CONTACT_MARGIN
-        )
-
-    def _ask(self, cause: str) -> None:
-        """Have the operator say how it goes on after a stop."""
-        said = self._operator.released(f"the arm is stopped: {cause}")
-        if said is None:
-            return
-        if said:
-            self._commands.release()
-        else:
-            self._progress.end = f"the arm was stopped: {cause}"
-
-
-class _Showing:
-    """A dry run's permission: every push is shown, with the way of the tip, and none is done."""
-
-    def __init__(
-        self, scenario: Scenario, meshcat: Meshcat | None, operator: TerminalOperator | None, console: Console
-    ):
-        self._kinematics = PandaKinematics(scenario.hardware.panda)
-        self._most = scenario.arm.most_interactions
-        self._meshcat, self._operator, self._console = meshcat, operator, console
-        self._push: Push | None = None
-        self._since = 0.0
-        self._shown = 0
-
-    def permit(self, push: Push) -> Permission:
-        """SKIP once it was looked at, END after as many as a run would have."""
-        if push is not self._push:
-            self._push, self._since = push, time.monotonic()
-            self._shown += 1
-            self._draw(push)
-        if self._operator is None:
-            if time.monotonic() - self._since < SHOWN_FOR:
-                return Permission.WAIT
-        else:
-            said = self._operator.answer(f"push {self._shown}: n for another, q to end", "n q")
-            if said != "n":
-                return Permission.WAIT if not said else Permission.END
-        return Permission.SKIP if self._shown < self._most else Permission.END
-
-    def _draw(self, push: Push) -> None:
-        assert push.path is not None
-        times = np.linspace(0, push.path.duration, 200)
-        way = np.array([self._kinematics.X_WE(push.path.position(t))[:3, 3] for t in times])
-        lowest = min(self._kinematics.clearance(push.path.position(t)) for t in times[::4])
-        x, y = push.p_WB[:2]
-        self._console.print(
-            f"push {self._shown} at ({x:.3f}, {y:.3f}) m, {push.path.duration:.1f} s, nothing nearer than "
-            f"{1e3 * lowest:.0f} mm to table or arm"
-        )
-        if self._meshcat is not None:
-            self._meshcat.SetLine("/riseg/planned_way", way.T, 3.0, Rgba(0.84, 0.37, 0.0))

@@ -202,7 +202,7 @@ def stream_commands(
     connection.send("ready")
     sent: deque[float] = deque(maxlen=1_000_000)
     period, refused, rounds, final = 1 / parameters.rate, "", 0, 0
-    due, before = time.monotonic(), time.monotonic() - period
+    due = time.monotonic()
     while final < FINAL_COMMANDS:
         refused = _obey(connection, stream) or refused
         if interrupted.is_set():
@@ -210,9 +210,9 @@ def stream_commands(
         status, now, start = news.read(), time.time(), time.monotonic()
         # After a delay the trajectory goes on to where it should be by now, if that is not far: its speed is
         # the arm's, by the stamps of the commands.
-        for _ in range(min(max(round((start - before) / period), 1), MOST_PERIODS)):
+        periods = min(1 + max(round((start - due) / period), 0), MOST_PERIODS)
+        for _ in range(periods):
             command = stream.step(now, status, news.image_time)
-        before = start
         if command is not None:
             now = time.time()
             news.lcm.Publish(lcm.command_channel, command_message(command, parameters.mode, now).encode())
@@ -225,7 +225,7 @@ def stream_commands(
                 connection,
                 StreamReport(stream.state, stream.position, status, stream.behind, stream.at_rest, refused),
             )
-        due = max(due + period, start + period / 2)  # after a delay no two commands at once
+        due = due + periods * period if periods < MOST_PERIODS else start + period
         time.sleep(max(due - time.monotonic(), 0.0))
     with suppress(OSError):
         connection.send(StreamReport(stream.state, stream.position, news.read(), stream.behind, True, refused))
