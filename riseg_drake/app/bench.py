@@ -33,12 +33,21 @@ StationOutputs = dict[str, Any]
 """What a station gave at one tick of the camera, by the names of the segmentation's inputs."""
 
 
-def bench_command(scenario_file: Path | None, seed: int, console: Console) -> None:
-    """Render one push, put it through the segmentation again and again, print what it cost."""
+def bench_command(scenario_file: Path | None, seed: int, stream: int | None, console: Console) -> None:
+    """Render one push, put it through the segmentation again and again, print what it cost.
+
+    With `stream` say instead how evenly commands come for so many seconds beside that.
+    """
     scenario = load_scenario(scenario_file)
     require_graphics()
     with console.status("rendering a push"):
         images = push_images(scenario, seed)
+    if stream:
+        from riseg_drake.app.stream_bench import bench_stream
+
+        with console.status(f"sending commands for {stream} s"):
+            bench_stream(scenario, images, stream, console)
+        return
     with console.status("measuring time"):
         clock = StageClock()
         for _ in range(REPETITIONS):
@@ -51,7 +60,7 @@ def bench_command(scenario_file: Path | None, seed: int, console: Console) -> No
     stages = stage_figures(clock.seconds)
     for stage, peaks in memory.peaks.items():
         stages[stage]["peak_mb"] = max(peaks) / 1e6
-    camera = scenario.station.camera
+    camera = scenario.station.camera.intrinsics
     console.print(
         stage_table(stages, f"Alg. 2 for one {camera.width}x{camera.height} image pair, during a push")
     )
@@ -96,6 +105,11 @@ class _StageMemory(StageClock):
         finally:
             _, peak = tracemalloc.get_traced_memory()
             self.peaks.setdefault(stage, []).append(peak - before)
+
+
+def segment_once(scenario: Scenario, images: Sequence[StationOutputs]) -> None:
+    """Put the images through Alg. 2, as fast as it goes."""
+    _segment(scenario, images, StageClock())
 
 
 def _segment(scenario: Scenario, images: Sequence[StationOutputs], clock: StageClock) -> None:

@@ -94,6 +94,48 @@ def _parser() -> argparse.ArgumentParser:
         help="also record the runs, and segment them as the paper has it, one switch at a time",
     )
 
+    hardware = _add(
+        commands,
+        "hardware",
+        _hardware,
+        "The same on a real Panda with a RealSense camera, over their drivers on LCM; see docs/hardware.md.\n"
+        "The operator confirms every push; --dry-run shows pushes and moves nothing.",
+    )
+    hardware.add_argument(
+        "scenario", type=Path, nargs="?", metavar="SCENARIO", help="a YAML file (the built-in hardware.yaml)"
+    )
+    hardware.add_argument("--seed", type=int, default=0, metavar="N", help="draws samples (0)")
+    hardware.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/SCENARIO_TIME)")
+    hardware.add_argument("--record", action="store_true", help="also write every frame to DIR/recording")
+    hardware.add_argument(
+        "--meshcat", action=argparse.BooleanOptionalAction, default=False, help="show it in the browser (no)"
+    )
+    hardware.add_argument(
+        "--dry-run", action="store_true", help="show every planned push in the browser, and move nothing"
+    )
+    hardware.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
+    hardware.add_argument(
+        "--truth", action="store_true", help="score the masks by the ground truth of `riseg emulate`"
+    )
+    hardware.add_argument(
+        "--replayed",
+        action="store_true",
+        help="hear a log that lcm-logplayer plays: old time stamps count as new, nothing is moved",
+    )
+
+    hand_eye = _add(
+        commands,
+        "hand-eye",
+        _hand_eye,
+        "Move a real arm a little over a scene that stands still, and compare expected with observed flow.\n"
+        "Says in pixels how well the camera's pose on the arm is known, and where the table is.",
+    )
+    hand_eye.add_argument(
+        "scenario", type=Path, nargs="?", metavar="SCENARIO", help="a YAML file (the built-in hardware.yaml)"
+    )
+    hand_eye.add_argument("--output", type=Path, metavar="DIR", help="folder for pictures (out/hand_eye)")
+    hand_eye.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
+
     emulate = _add(
         commands,
         "emulate",
@@ -174,6 +216,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_scenario(bench)
     bench.add_argument("--seed", type=int, default=0, metavar="N", help="draws the scene and the noise (0)")
+    bench.add_argument(
+        "--stream",
+        type=_positive,
+        metavar="SECONDS",
+        help="measure instead how evenly commands for a real arm are sent beside the segmentation",
+    )
 
     diagram = _add(
         commands,
@@ -253,6 +301,32 @@ def _evaluate(chosen: argparse.Namespace, console: Console) -> None:
     )
 
 
+def _hardware(chosen: argparse.Namespace, console: Console) -> None:
+    # Threads that wait for each other busily take the processor from the drivers and from the commands.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    from riseg_drake.app.hardware import hardware_command
+
+    hardware_command(
+        chosen.scenario,
+        chosen.seed,
+        chosen.output,
+        chosen.record,
+        chosen.meshcat,
+        chosen.dry_run,
+        chosen.yes,
+        chosen.truth,
+        chosen.replayed,
+        console,
+    )
+
+
+def _hand_eye(chosen: argparse.Namespace, console: Console) -> None:
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    from riseg_drake.app.hand_eye import hand_eye_command
+
+    hand_eye_command(chosen.scenario, chosen.output, chosen.yes, console)
+
+
 def _emulate(chosen: argparse.Namespace, console: Console) -> None:
     from riseg_drake.app.emulate import emulate_command
 
@@ -285,7 +359,7 @@ def _score(chosen: argparse.Namespace, console: Console) -> None:
 def _bench(chosen: argparse.Namespace, console: Console) -> None:
     from riseg_drake.app.bench import bench_command
 
-    bench_command(chosen.scenario, chosen.seed, console)
+    bench_command(chosen.scenario, chosen.seed, chosen.stream, console)
 
 
 def _diagram(chosen: argparse.Namespace, console: Console) -> None:
@@ -296,15 +370,19 @@ def _diagram(chosen: argparse.Namespace, console: Console) -> None:
 
 def _mistakes() -> tuple[type[Exception], ...]:
     """The errors that tell a person what to do otherwise; any other is a fault of this program."""
+    from riseg_drake.app.arm_travel import TravelError
     from riseg_drake.app.evaluate import EvaluationError
     from riseg_drake.app.graphics import NoGraphicsError
+    from riseg_drake.app.hardware import HardwareError
     from riseg_drake.app.output import OutputError
     from riseg_drake.app.scenario_file import ScenarioError
     from riseg_drake.app.scene_pool import ClusterError
     from riseg_drake.evaluation.label_folders import LabelFolderError
     from riseg_drake.recording.layout import RecordingError
     from riseg_drake.robot.own_robot import OwnRobotError
+    from riseg_drake.stations.command_process import CommandError
     from riseg_drake.stations.lcm_channels import LcmError
+    from riseg_drake.stations.lcm_images import ImageError
     from riseg_drake.stations.misbehaviour import WordError
     from riseg_drake.stations.panda_driver import DriverEndedError
     from riseg_drake.stations.scene import SceneError
@@ -320,6 +398,10 @@ def _mistakes() -> tuple[type[Exception], ...]:
         EvaluationError,
         ClusterError,
         LcmError,
+        ImageError,
+        CommandError,
+        HardwareError,
+        TravelError,
         WordError,
         DriverEndedError,
     )

@@ -1,10 +1,13 @@
 """The wiring: a station, Alg. 2, Alg. 3 and the arm's motion as one Diagram."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import Meshcat
+from pydrake.lcm import DrakeLcm
 from pydrake.systems.framework import (
     Context,
     Diagram,
@@ -19,16 +22,28 @@ from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.segmentation_block import STATION_PORTS, add_segmentation
 from riseg_drake.geometry.rgbd import FramePair
-from riseg_drake.pushing.push import ArmPhase
-from riseg_drake.robot.kinematics import PandaKinematics
+from riseg_drake.pushing.push import ArmPhase, Push
+from riseg_drake.robot.kinematics import PandaKinematics, observation_posture
 from riseg_drake.segmentation.segment import Segmentation
-from riseg_drake.stations.simulated import SimulatedStation, start_position
-from riseg_drake.systems.arm_motion import ArmMotion
+from riseg_drake.stations.hardware import HardwareStation, TargetSink
+from riseg_drake.stations.lcm_reception import Reception
+from riseg_drake.stations.simulated import SimulatedStation, SimulatedStationConfig, start_position
+from riseg_drake.systems.arm_motion import ArmMotion, Permission
 from riseg_drake.systems.push_planner import PushPlanner
 
 
+@dataclass(frozen=True)
+class Drivers:
+    """The way to a real robot."""
+
+    reception: Reception
+    """What arm and camera say."""
+    sink: TargetSink | None = None
+    """Who moves the arm; None: nobody."""
+
+
 class WiredDiagram:
-    """The whole of Alg. 1 around a simulated station, and what an application reads from it.
+    """The whole of Alg. 1 around a station, and what an application reads from it.
 
     All ports of the station are exported under their own names, and the outputs of the stages: `pair`,
     `above_table`, `expected_flow`, `optical_flow`, `groups`, `mask`, `segmentation`, `push`, `phase`,
@@ -36,15 +51,21 @@ class WiredDiagram:
     """
 
     def __init__(
-        self, diagram: Diagram, station: SimulatedStation, stages: list[LeafSystem], scenario: Scenario
+        self,
+        diagram: Diagram,
+        station: SimulatedStation | HardwareStation,
+        stages: list[LeafSystem],
+        scenario: Scenario,
     ):
         self.diagram = diagram
         self.stages = stages
         self.intrinsics = scenario.station.camera.intrinsics
         self.most_interactions = scenario.arm.most_interactions
-        self.object_names = {i: placed.name for i, placed in enumerate(station.objects, start=1)}
-        """By object id, as in the ground truth."""
-        self._object_bodies = station.object_bodies
+        simulated = isinstance(station, SimulatedStation)
+        objects = station.objects if simulated else []
+        self.object_names = {i: placed.name for i, placed in enumerate(objects, start=1)}
+        """By object id, as in the ground truth; empty where nobody knows it."""
+        self._object_bodies = station.object_bodies if simulated else {}
         self._ports: dict[str, OutputPort] = {}
 
     def read(self, port: str, context: Context) -> Any:
@@ -101,24 +122,41 @@ class WiredDiagram:
         }
 
 
-def make_diagram(scenario: Scenario, seed: int, meshcat: Meshcat | None = None) -> WiredDiagram:
-    """Build the simulation of a scenario; the seed draws scene, noise and samples.
+def make_diagram(
+    scenario: Scenario,
+    seed: int,
+    meshcat: Meshcat | None = None,
+    *,
+    drivers: Drivers | None = None,
+    permit: Callable[[Push], Permission] | None = None,
+) -> WiredDiagram:
+    """Build the diagram of a scenario; the seed draws samples and, in simulation, scene and noise.
 
-    Raises ScenarioError (or the station's SceneError) for settings that cannot be.
+    `drivers` are those of a real robot; without them such a scenario is wired to nothing, to be looked at.
+    `permit` is asked about every push. Raises ScenarioError (or the station's SceneError) for settings that
+    cannot be.
     """
     config = scenario.station
+    station: SimulatedStation | HardwareStation
     try:
-        station = SimulatedStation(config, seed, meshcat=meshcat)
-        q_observe = np.array(start_position(config))
+        kinematics = PandaKinematics(config.panda)
+        if isinstance(config, SimulatedStationConfig):
+            station = SimulatedStation(config, seed, meshcat=meshcat)
+            q_observe = np.array(start_position(config))
+        else:
+            drivers = drivers or Drivers(Reception(DrakeLcm("memq://"), config.lcm))
+            station = HardwareStation(config, drivers.reception, drivers.sink, meshcat=meshcat)
+            q_observe = observation_posture(
+                kinematics, config.centre_W, config.observe_height, config.start_position
+            )
     except (ValueError, RuntimeError) as error:
         raise ScenarioError(" ".join(str(error).split())) from error
-    kinematics = PandaKinematics(config.panda)
 
     builder = DiagramBuilder()
     builder.AddSystem(station)
     segmentation = add_segmentation(builder, scenario, kinematics, seed)
     planner = builder.AddSystem(PushPlanner(kinematics, scenario.push, seed))
-    arm = builder.AddSystem(ArmMotion(q_observe, scenario.arm))
+    arm = builder.AddSystem(ArmMotion(q_observe, scenario.arm, permit))
 
     for name, port in STATION_PORTS.items():
         builder.Connect(station.GetOutputPort(port), segmentation.inputs[name])

@@ -26,8 +26,10 @@ from riseg_drake.stations.emulated_camera import EmulatedCamera
 from riseg_drake.stations.emulated_drivers import CameraSide, EmulatorConfig, Moment, PandaSide
 from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm, receive_buffer_warning
 from riseg_drake.stations.misbehaviour import CONTROL_CHANNEL, WORDS, WordError, parse_word
+from riseg_drake.stations.promptness import be_prompt
 
 _GIVE_WAY = 2  # niceness of the camera's process: the status comes first, but pictures must not starve
+_PRIORITY = 10  # of the arm's process among real-time ones, where the system allows that
 _LONGEST_WAIT = 0.05  # s, until the camera's process listens for words again
 
 
@@ -69,7 +71,7 @@ def emulate_command(
 
 def _place(scenario: Scenario, seed: int) -> EmulatedArm:
     try:
-        return EmulatedArm(scenario.station, scenario.emulator.driver, seed, _wall_us())
+        return EmulatedArm(scenario.simulated, scenario.emulator.driver, seed, _wall_us())
     except (ValueError, RuntimeError) as error:
         raise ScenarioError(" ".join(str(error).split())) from error
 
@@ -84,8 +86,7 @@ def _run(
         if sys.stdin.isatty():
             console.print(f"you may type: {WORDS}")
         threading.Thread(target=_pass_on, args=(config.lcm, console), daemon=True).start()
-    gc.collect()
-    gc.freeze()  # what is there stays there: no pauses to look through it
+    be_prompt(_PRIORITY)  # as the real arm, which has a computer of its own
     start = time()
     try:
         _keep_time(side, camera, 1 / config.rate, console)
@@ -137,7 +138,7 @@ def _draw(commands: Connection, scenario_file: Path | None, seed: int) -> None:
     os.nice(_GIVE_WAY)
     scenario = load_scenario(scenario_file)
     try:
-        eye = EmulatedCamera(scenario.station, seed)
+        eye = EmulatedCamera(scenario.simulated, seed)
     except (ValueError, RuntimeError) as error:
         with suppress(BrokenPipeError):
             commands.send(" ".join(str(error).split()))

@@ -47,8 +47,8 @@ def evaluate_command(
     """Run what is missing of an evaluation, then write its report."""
     scenario = load_scenario(scenario_file)
     if objects is not None:
-        scenario.station.scene.objects = str(objects.resolve())
-    find_models(scenario.station.scene.objects, scenario.station.scene.names)  # says it if there are none
+        scenario.simulated.scene.objects = str(objects.resolve())
+    find_models(scenario.simulated.scene.objects, scenario.simulated.scene.names)  # says it if there are none
     name = scenario_name(scenario_file)
     tasks = scene_tasks(
         scenario, name, output or Path("out") / f"evaluate_{name}_seed_{seed}", scenes, seed, ablation

@@ -1,6 +1,6 @@
 """Alg. 1: the robot acts and segments, and every interaction leaves L*_t behind."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,6 +21,32 @@ Listener = Callable[[Frame, Context], None]
 """Is told every camera frame once, with the diagram's context at that moment."""
 
 
+@dataclass(frozen=True)
+class Truth:
+    """What somebody knows who may cheat, of the moment of one frame."""
+
+    labels: NDArray[np.uint16]
+    """The true visible object ids [H, W]."""
+    poses: dict[str, NDArray[np.float64]]
+    """The true poses X_WB [4, 4] of the objects, by name."""
+    names: Mapping[int, str]
+    """By object id."""
+
+
+TruthSource = Callable[[Frame, Context], Truth | None]
+"""Asked for the truth behind a frame; None where it is not known."""
+
+
+@dataclass(frozen=True)
+class WallClock:
+    """To run at wall time, as with a real robot, instead of as fast as possible from 0 on."""
+
+    start: float
+    """Wall time now, s: the diagram's time at the start."""
+    look: Callable[[Context], bool]
+    """Called after every step; true stops the diagram for a moment, to look at `Progress.end`."""
+
+
 @dataclass
 class Progress:
     """How far a run has come; renewed at every camera frame."""
@@ -31,7 +57,7 @@ class Progress:
     objects: int = 0
     """Objects found so far."""
     time: float = 0.0
-    """Simulated, s."""
+    """Since the start, s."""
     frames: int = 0
     end: str = ""
     """Why the run ended; empty while it goes on."""
@@ -43,21 +69,29 @@ def interactions(
     progress: Progress,
     longest: float,
     listeners: tuple[Listener, ...] = (),
+    *,
+    truth: TruthSource | None = None,
+    wall: WallClock | None = None,
 ) -> Iterator[Step]:
     """Run Alg. 1; yields how things stand before the first and after every interaction.
 
     It ends when the arm is done (no push is left, a_i = null, or enough were made), or when `longest`
-    seconds were simulated; `progress.end` says which.
+    seconds have passed; `progress.end` says which. At wall time also when somebody else has set
+    `progress.end`; how things stand then is yielded, too. The truth is that of the simulation if not given.
     """
     clock.watch(wired.stages)
     simulator = Simulator(wired.diagram)
     context = simulator.get_mutable_context()
-    news = _News(wired)
+    news = _News(wired, wall.look if wall else None)
     simulator.set_monitor(news.look)
-    book = _Book(wired, context, clock)
+    book = _Book(wired, context, clock, truth or simulated_truth(wired))
+    start = wall.start if wall else 0.0
+    if wall:
+        context.SetTime(start)
+        simulator.set_target_realtime_rate(1.0)
     simulator.Initialize()
     while not progress.end:  # line 4
-        simulator.AdvanceTo(longest)  # lines 5 to 8, up to the next mask or the arm's next phase
+        simulator.AdvanceTo(start + longest)  # lines 5 to 8, up to the next mask or the arm's next phase
         if news.mask_is_new:
             news.mask_is_new = False
             progress.frames += 1
@@ -66,7 +100,7 @@ def interactions(
             for listener in listeners:
                 listener(news.frame, context)
         decided = progress.phase is ArmPhase.OBSERVE and news.phase is not ArmPhase.OBSERVE
-        progress.time, progress.phase = context.get_time(), news.phase
+        progress.time, progress.phase = context.get_time() - start, news.phase
         if decided:
             yield book.close(wired.interaction_step(context))  # line 10
             progress.interaction_step += 1  # line 9
@@ -77,14 +111,20 @@ def interactions(
                 f"{made} of {made} interactions were made" if enough else "no push is left that could find more"
             )
         elif progress.time >= longest:
-            progress.end = f"{longest:g} s were simulated"
+            progress.end = f"{longest:g} s were {'over' if wall else 'simulated'}"
+        elif progress.end and wall and book.has_seen:
+            yield book.close(wired.interaction_step(context))
+
+
+def simulated_truth(wired: WiredDiagram) -> TruthSource:
+    """The truth that a simulated station knows."""
+    return lambda _, context: Truth(wired.true_labels(context), wired.true_poses(context), wired.object_names)
 
 
 class _Seen(NamedTuple):
     frame: Frame
     mask: NDArray[np.uint16]
-    true_labels: NDArray[np.uint16]
-    true_poses: dict[str, NDArray[np.float64]]
+    truth: Truth | None
 
 
 class _News:
@@ -93,7 +133,8 @@ class _News:
     frame: Frame
     """I_t of the newest mask; not there before the first."""
 
-    def __init__(self, wired: WiredDiagram):
+    def __init__(self, wired: WiredDiagram, look: Callable[[Context], bool] | None):
+        self._look = look
         self.phase = ArmPhase.OBSERVE
         self.mask_is_new = False
         self._wired = wired
@@ -101,9 +142,12 @@ class _News:
 
     def look(self, context: Context) -> EventStatus:
         """The simulator's monitor; it is called after every step, hundreds of times a second."""
+        wanted = self._look is not None and self._look(context)
         phase = self._wired.phase(context)
         sequence = self._wired.segmentation(context).sequence
         if phase is self.phase and sequence == self._sequence:
+            if wanted:
+                return EventStatus.ReachedTermination(self._wired.diagram, "somebody wants to look")
             return EventStatus.DidNothing()
         if sequence != self._sequence:
             pair = self._wired.pair(context)
@@ -116,27 +160,32 @@ class _News:
 class _Book:
     """What is counted between two steps, and what was last seen from the observation posture."""
 
-    def __init__(self, wired: WiredDiagram, context: Context, clock: StageClock):
-        self._wired, self._context, self._clock = wired, context, clock
+    def __init__(self, wired: WiredDiagram, context: Context, clock: StageClock, truth: TruthSource):
+        self._wired, self._context, self._clock, self._truth = wired, context, clock, truth
         self._frames = 0
         self._start: dict[str, NDArray] | None = None  # poses before the first interaction,
         self._before: dict[str, NDArray] = {}  # and before the one that is under way,
         self._pushed: str | None = None  # and what that one pushes
         self._seen: _Seen | None = None
 
+    @property
+    def has_seen(self) -> bool:
+        """Whether there is anything to close a step with."""
+        return self._seen is not None
+
     def count(self, frame: Frame, is_at_rest: bool) -> None:
         """Take note of a frame; of one at rest also of the truth of the same moment."""
         self._frames += 1
-        if is_at_rest:
-            wired, context = self._wired, self._context
-            self._seen = _Seen(
-                frame, wired.mask(context), wired.true_labels(context), wired.true_poses(context)
-            )
+        if not is_at_rest:
+            return
+        truth = self._truth(frame, self._context)
+        if truth is not None or self._seen is None or self._seen.truth is None:
+            self._seen = _Seen(frame, self._wired.mask(self._context), truth)
 
     def close(self, interaction_step: int) -> Step:
         """The step that ends with the last frame at rest; the count starts anew."""
         assert self._seen is not None
-        frame, mask, ground_truth, poses = self._seen
+        frame, mask, truth = self._seen
         step = Step(
             interaction_step=interaction_step,
             time=frame.time,
@@ -145,19 +194,21 @@ class _Book:
             mask=mask,
             frames=self._frames,
             stage_seconds={stage: tuple(times) for stage, times in self._clock.seconds.items()},
-            ground_truth=ground_truth,
-            scores=score(mask, ground_truth),
+            ground_truth=truth.labels if truth else None,
+            scores=score(mask, truth.labels) if truth else None,
             disturbance=None
-            if self._start is None
-            else Disturbance(self._pushed, motion_between(self._start, self._before, poses)),
+            if self._start is None or truth is None
+            else Disturbance(self._pushed, motion_between(self._start, self._before, truth.poses)),
         )
-        self._start = self._start or poses
-        self._frames, self._before, self._pushed = 0, poses, self._next_pushed(frame, ground_truth)
+        if truth is not None:
+            self._start, self._before = self._start or truth.poses, truth.poses
+        self._pushed = self._next_pushed(frame, truth) if truth else None
+        self._frames, self._seen = 0, None
         self._clock.seconds.clear()
         return step
 
-    def _next_pushed(self, frame: Frame, ground_truth: NDArray[np.uint16]) -> str | None:
+    def _next_pushed(self, frame: Frame, truth: Truth) -> str | None:
         """The object that the push now beginning goes for."""
         push: Push | None = self._wired.read("active_push", self._context)
-        object_id = None if push is None else object_at(push.p_WB, frame, ground_truth)
-        return None if object_id is None else self._wired.object_names[object_id]
+        object_id = None if push is None else object_at(push.p_WB, frame, truth.labels)
+        return None if object_id is None else truth.names[object_id]

@@ -15,7 +15,7 @@ from rich.status import Status
 
 from riseg_drake.app.diagram import WiredDiagram, make_diagram
 from riseg_drake.app.graphics import require_graphics
-from riseg_drake.app.interactions import Listener, Progress, interactions
+from riseg_drake.app.interactions import Listener, Progress, TruthSource, interactions, simulated_truth
 from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step, stage_figures, to_json
 from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
 from riseg_drake.app.tables import score_table, stage_table
@@ -43,7 +43,7 @@ def run_command(
     browser = StartMeshcat() if meshcat else None
     with console.status("placing the objects") as status:
         steps = run(scenario, seed, folder, record, browser, Narrator(console, status))
-    _report(steps, console)
+    report(steps, console)
 
 
 def run(
@@ -59,7 +59,7 @@ def run(
     progress = Progress()
     steps: list[Step] = []
     with ExitStack() as stack:
-        stack.enter_context(_state_of(folder, progress, steps))
+        stack.enter_context(state_of(folder, progress, steps))
         wired = make_diagram(scenario, seed, meshcat)
         folder.note(objects={str(object_id): name for object_id, name in wired.object_names.items()})
         listeners: list[Listener] = [lambda *_: narrator.follow(progress)]
@@ -119,7 +119,7 @@ def _objects(number: int) -> str:
 
 
 @contextmanager
-def _state_of(folder: RunFolder, progress: Progress, steps: list[Step]) -> Iterator[None]:
+def state_of(folder: RunFolder, progress: Progress, steps: list[Step]) -> Iterator[None]:
     """Enter in the summary how the run ended, also where it was stopped or failed."""
     start = perf_counter()
 
@@ -145,10 +145,12 @@ def _state_of(folder: RunFolder, progress: Progress, steps: list[Step]) -> Itera
     finish("done", progress.end)
 
 
-def recorder(wired: WiredDiagram, writer: RecordingWriter) -> Listener:
-    """Writes every frame, with the truth that the simulation knows."""
+def recorder(wired: WiredDiagram, writer: RecordingWriter, truth: TruthSource | None = None) -> Listener:
+    """Writes every frame, with the true labels where they are known."""
+    truth = truth or simulated_truth(wired)
 
     def record(frame: Frame, context: Context) -> None:
+        known = truth(frame, context)
         writer.append(
             RecordedFrame(
                 time=frame.time,
@@ -157,7 +159,7 @@ def recorder(wired: WiredDiagram, writer: RecordingWriter) -> Listener:
                 X_WC=frame.X_WC,
                 position=wired.position(context),
                 robot=frame.robot,
-                labels=wired.true_labels(context),
+                labels=known.labels if known else None,
             )
         )
 
@@ -176,10 +178,12 @@ def _replay(meshcat: Meshcat, file: Path) -> Iterator[None]:
         write_text(file, meshcat.StaticHtml())
 
 
-def _report(steps: list[Step], console: Console) -> None:
+def report(steps: list[Step], console: Console) -> None:
+    """Print the scores of every step, where there are any, and the times of the stages."""
     rows = [(str(step.interaction_step), step.scores) for step in steps if step.scores is not None]
-    console.print("\nscores in percent, after each interaction")
-    console.print(score_table(rows, first="\nstep"))
+    if rows:
+        console.print("\nscores in percent, after each interaction")
+        console.print(score_table(rows, first="\nstep"))
     seconds: dict[str, list[float]] = defaultdict(list)
     for step in steps:
         for stage, times in step.stage_seconds.items():

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 
-from riseg_drake.app.scenario_file import parse_scenario, read_scenario
+from riseg_drake.app.scenario_file import ScenarioError, parse_scenario, read_scenario
 from riseg_drake.pushing.push_planning import PushPlanningParameters
 from riseg_drake.segmentation.above_table import AboveTableParameters
 from riseg_drake.segmentation.bfif import BFIFParameters
@@ -13,18 +13,20 @@ from riseg_drake.segmentation.frame_pairs import FramePairParameters
 from riseg_drake.segmentation.optical_flow import DisFlowParameters
 from riseg_drake.segmentation.segment import SegmentParameters
 from riseg_drake.stations.emulated_drivers import EmulatorConfig
+from riseg_drake.stations.hardware import HardwareStationConfig
 from riseg_drake.stations.simulated import SimulatedStationConfig
 from riseg_drake.systems.arm_motion import ArmMotionParameters
 
 BUILT_IN = "simulation"
+HARDWARE = "hardware"
 
 
 @dataclass
 class Scenario:
     """A YAML file's keys are these fields, and theirs in turn; what it leaves out stays as it is here."""
 
-    station: SimulatedStationConfig = field(default_factory=SimulatedStationConfig)
-    """Arm, camera, table, objects and physics."""
+    station: SimulatedStationConfig | HardwareStationConfig = field(default_factory=SimulatedStationConfig)
+    """Arm, camera, table, objects and physics; or, tagged !HardwareStationConfig, a robot and its drivers."""
     above_table: AboveTableParameters = field(default_factory=AboveTableParameters)
     """What counts as standing on the table (Alg. 3, line 1)."""
     frame_pair: FramePairParameters = field(default_factory=FramePairParameters)
@@ -46,15 +48,32 @@ class Scenario:
     longest: float = 300.0
     """A run ends after this time even if the arm is not done, simulated seconds."""
 
+    @property
+    def simulated(self) -> SimulatedStationConfig:
+        """The station, for what only a simulation can do. Raises ScenarioError for a real one."""
+        if isinstance(self.station, SimulatedStationConfig):
+            return self.station
+        raise ScenarioError("the scenario describes a real robot; this command wants a simulated station")
 
-def load_scenario(path: Path | None) -> Scenario:
-    """The scenario of a file, or the built-in simulation. Raises ScenarioError."""
+    @property
+    def hardware(self) -> HardwareStationConfig:
+        """The station, for what only a real one can do. Raises ScenarioError for a simulated one."""
+        if isinstance(self.station, HardwareStationConfig):
+            return self.station
+        raise ScenarioError(
+            "the scenario describes a simulation; `riseg hardware` wants `station: !HardwareStationConfig`, "
+            "as the built-in hardware.yaml has it"
+        )
+
+
+def load_scenario(path: Path | None, otherwise: str = BUILT_IN) -> Scenario:
+    """The scenario of a file, or a built-in one. Raises ScenarioError."""
     if path is not None:
         return read_scenario(path, Scenario)
-    built_in = files("riseg_drake.diagrams") / f"{BUILT_IN}.yaml"
+    built_in = files("riseg_drake.diagrams") / f"{otherwise}.yaml"
     return parse_scenario(built_in.read_text(encoding="utf-8"), Scenario, source=built_in.name)
 
 
-def scenario_name(path: Path | None) -> str:
+def scenario_name(path: Path | None, otherwise: str = BUILT_IN) -> str:
     """What a scenario is called in folders and summaries."""
-    return BUILT_IN if path is None else path.stem
+    return otherwise if path is None else path.stem

@@ -56,7 +56,7 @@ def parse_scenario(text: str, schema: type[Schema], source: str) -> Schema:
 def _check(node: yaml.Node, schema: Any, name: str, source: str) -> None:
     """Raise ScenarioError if a YAML node does not fit the schema of its field."""
     where = f"{source}: line {node.start_mark.line + 1}:"
-    schema = _without_none(schema, node)
+    schema = _variant(_without_none(schema, node), node, name, where)
     if schema is None:
         return
     if dataclasses.is_dataclass(schema):
@@ -105,7 +105,19 @@ def _without_none(schema: Any, node: yaml.Node) -> Any:
     if node.tag.endswith(":null"):
         return None
     rest = [choice for choice in typing.get_args(schema) if choice is not type(None)]
-    return rest[0] if len(rest) == 1 else None
+    return typing.Union[tuple(rest)]  # noqa: UP007  (of a number of types that is known only here)
+
+
+def _variant(schema: Any, node: yaml.Node, name: str, where: str) -> Any:
+    """Of a choice between dataclasses the one that a tag such as !Name asks for; the first without a tag."""
+    if typing.get_origin(schema) not in (typing.Union, types.UnionType):
+        return schema
+    variants = {f"!{choice.__name__}": choice for choice in typing.get_args(schema)}
+    if not node.tag.startswith("!"):
+        return next(iter(variants.values()))
+    if node.tag not in variants:
+        raise ScenarioError(f"{where} {name} must be one of {', '.join(variants)}, not {node.tag}")
+    return variants[node.tag]
 
 
 def _is_number(node: yaml.ScalarNode) -> bool:

@@ -37,9 +37,9 @@ class _ObservationView:
     """Turns the images of a step into the frame that they were: all are taken from one posture."""
 
     def __init__(self, scenario: Scenario):
-        self._intrinsics = scenario.station.camera.intrinsics
-        kinematics = PandaKinematics(scenario.station.panda)
-        q = np.array(start_position(scenario.station))
+        self._intrinsics = scenario.simulated.camera.intrinsics
+        kinematics = PandaKinematics(scenario.simulated.panda)
+        q = np.array(start_position(scenario.simulated))
         self._X_WC = kinematics.X_WC(q)
         self._robot = RobotSilhouette(kinematics, self._intrinsics).mask(q)
 

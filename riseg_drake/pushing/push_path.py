@@ -46,6 +46,8 @@ class PushPathParameters:
     """... and the angle between them, rad."""
     joint_step: float = 0.25
     """No joint may turn more than this between two of those poses, rad: beyond, it would be a leap."""
+    min_clearance: float = MIN_CLEARANCE
+    """Room that arm, pusher and camera keep to the table and to each other, m."""
 
 
 @dataclass(frozen=True)
@@ -99,11 +101,13 @@ def plan_push_path(
 
     reached_W = push.p_WE + push.length * ahead_W
     # From the push outwards: the posture for it is chosen first, the rest has to lead there.
-    q_start = kinematics.solve_ik(tip_pointing_down(push.p_WE, yaw), q_observe)
+    q_start = kinematics.solve_ik(
+        tip_pointing_down(push.p_WE, yaw), q_observe, min_clearance=parameters.min_clearance
+    )
     if q_start is None:
         return None
-    stroke = _trace(_straight(push.p_WE, reached_W, yaw, yaw, parameters), q_start, kinematics)
-    climb = _trace(_straight(push.p_WE, above_W, yaw, yaw, parameters), q_start, kinematics)
+    stroke = _trace(_straight(push.p_WE, reached_W, yaw, yaw, parameters), q_start, kinematics, parameters)
+    climb = _trace(_straight(push.p_WE, above_W, yaw, yaw, parameters), q_start, kinematics, parameters)
     if stroke is None or climb is None:
         return None
     legs = _crossing(q_observe, climb[-1], crossing, kinematics, parameters)
@@ -127,7 +131,7 @@ def _crossing(
     p_WE, yaw = _tip(kinematics, q_from)
     if p_WE[2] < height:  # up first, where it stands
         raised_W = np.append(p_WE[:2], height)
-        rise = _trace(_straight(p_WE, raised_W, yaw, yaw, parameters), q_from, kinematics)
+        rise = _trace(_straight(p_WE, raised_W, yaw, yaw, parameters), q_from, kinematics, parameters)
         if rise is None:
             return None
         legs.append(rise)
@@ -157,9 +161,11 @@ def _straight(
     ]
 
 
-def _trace(poses: list[NDArray], q_from: NDArray, kinematics: PandaKinematics) -> NDArray[np.float64] | None:
+def _trace(
+    poses: list[NDArray], q_from: NDArray, kinematics: PandaKinematics, parameters: PushPathParameters
+) -> NDArray[np.float64] | None:
     """Joint angles [N, 7] along poses, the first q_from; None where the arm cannot follow."""
-    traced = kinematics.trace_ik(poses, q_from)
+    traced = kinematics.trace_ik(poses, q_from, min_clearance=parameters.min_clearance)
     return None if traced is None else np.vstack([q_from, *traced])
 
 
@@ -182,7 +188,7 @@ def _lead(
             q is None
             or np.abs(q - led[-1]).max() > parameters.joint_step
             or not PANDA_LIMITS.contains(q, LIMIT_MARGIN)
-            or kinematics.clearance(q) < MIN_CLEARANCE
+            or kinematics.clearance(q) < parameters.min_clearance
         ):
             return None
         led.append(q)

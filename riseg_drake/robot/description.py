@@ -1,6 +1,6 @@
 """Which arm, with which tool: from model files into a MultibodyPlant."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 
@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Frame, ModelInstanceIndex
+from pydrake.multibody.tree import FixedOffsetFrame, Frame, ModelInstanceIndex
 
 MODELS_PACKAGE = "riseg_drake_models"
 JOINT_NAMES = tuple(f"panda_joint{i}" for i in range(1, 8))
@@ -26,6 +26,9 @@ class PandaDescription:
     """Folder of an offline copy of the package drake_models; empty: Drake's own, which it downloads."""
     tool_yaw: float = 0.0
     """Angle about the flange's z axis from the flange (panda_link8) to the tip frame E, rad."""
+    X_EC: list[float] = field(default_factory=list)
+    """The camera on the tool as calibrated: x, y, z in m, roll, pitch, yaw in rad; empty: as the pusher's
+    model has it."""
 
 
 @dataclass(frozen=True)
@@ -76,9 +79,13 @@ def add_panda(plant: MultibodyPlant, description: PandaDescription) -> PandaPart
         plant.GetFrameByName("pusher", pusher),
         RigidTransform(RollPitchYaw(0, 0, description.tool_yaw), np.zeros(3)),
     )
-    return PandaParts(
-        arm=arm,
-        pusher=pusher,
-        tip_frame=plant.GetFrameByName("tip", pusher),
-        camera_frame=plant.GetFrameByName("camera", pusher),
-    )
+    tip_frame = plant.GetFrameByName("tip", pusher)
+    camera_frame = plant.GetFrameByName("camera", pusher)
+    if description.X_EC:
+        if len(description.X_EC) != 6:
+            raise ValueError(
+                f"X_EC: {len(description.X_EC)} numbers; expected 6: x, y, z in m and roll, pitch, yaw in rad"
+            )
+        X_EC = RigidTransform(RollPitchYaw(description.X_EC[3:]), description.X_EC[:3])
+        camera_frame = plant.AddFrame(FixedOffsetFrame("calibrated_camera", tip_frame, X_EC, pusher))
+    return PandaParts(arm=arm, pusher=pusher, tip_frame=tip_frame, camera_frame=camera_frame)

@@ -201,3 +201,30 @@ def observe_pose(
     p_EC_W = X_WE[:3, :3] @ X_EC[:3, 3]
     X_WE[:3, 3] = np.add(p_WT, [0, 0, height]) - p_EC_W
     return X_WE
+
+
+def observation_posture(
+    kinematics: PandaKinematics, centre_W: Sequence[float], height: float, given: Sequence[float] = ()
+) -> NDArray[np.float64]:
+    """Joint angles [7], rad, to look from: those given, or looking straight down at a point of the table.
+
+    Args:
+        kinematics: of the arm.
+        centre_W: the point's x and y in W, m.
+        height: of the camera above it, m.
+        given: joint angles, rad, to be used instead; may be empty.
+
+    Raises:
+        ValueError: these are not seven, or the arm cannot look from there.
+    """
+    if len(given):
+        if len(given) != 7:
+            raise ValueError(f"start_position: {len(given)} angles; expected 7, in rad")
+        return np.array(given, np.float64)
+    q = kinematics.solve_ik(observe_pose([*centre_W, 0.0], height, kinematics.X_EC))
+    if q is None:
+        raise ValueError(
+            f"observe_height: no posture looks at {list(centre_W)} from {height} "
+            "m; 0.5 m above (0.5, 0) is within reach"
+        )
+    return q

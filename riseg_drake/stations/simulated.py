@@ -42,7 +42,7 @@ from riseg_drake.robot.description import (
     add_panda,
     register_models,
 )
-from riseg_drake.robot.kinematics import PandaKinematics, observe_pose
+from riseg_drake.robot.kinematics import PandaKinematics, observation_posture
 from riseg_drake.stations.scene import (
     PlacedObject,
     SceneConfig,
@@ -232,18 +232,11 @@ class SimulatedStation(Diagram):
 
 def start_position(config: SimulatedStationConfig) -> list[float]:
     """Joint angles at the start, rad [7]. Raises ValueError where the arm cannot look from there."""
-    if config.start_position:
-        if len(config.start_position) != 7:
-            raise ValueError(f"start_position: {len(config.start_position)} angles; expected 7, in rad")
-        return config.start_position
-    kinematics = PandaKinematics(config.panda)
-    q = kinematics.solve_ik(observe_pose([*config.scene.centre_W, 0.0], config.observe_height, kinematics.X_EC))
-    if q is None:
-        raise ValueError(
-            f"observe_height: no posture looks at {config.scene.centre_W} from {config.observe_height} "
-            "m; 0.5 m above (0.5, 0) is within reach"
+    return list(
+        observation_posture(
+            PandaKinematics(config.panda), config.scene.centre_W, config.observe_height, config.start_position
         )
-    return list(q)
+    )
 
 
 def _set_gains(plant: MultibodyPlant, arm: ModelInstanceIndex, config: SimulatedStationConfig) -> None:

@@ -1,6 +1,8 @@
 """ArmMotion: the loop of Alg. 1 as seen from the arm. Observe, approach, push, retreat, observe."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from enum import Enum
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,15 @@ from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.pushing.push import ArmPhase, Push
 from riseg_drake.pushing.time_law import minimum_jerk
 from riseg_drake.pushing.tried_pushes import SegmentedSoFar, TriedPush, segmented_so_far
+
+
+class Permission(Enum):
+    """What the operator says to a push that was found."""
+
+    WAIT = "no answer yet"
+    DO = "do it"
+    SKIP = "not this one; find another"
+    END = "no push any more"
 
 
 @dataclass
@@ -43,6 +54,8 @@ class _Memory:
     interaction_step: int = 0
     push: Push | None = None
     """What the arm is doing now; None at the observation posture."""
+    proposed: Push | None = None
+    """What it would do next, and has not been permitted yet."""
     start_time: float = 0.0
     offset: NDArray[np.float64] = field(default_factory=lambda: np.zeros(7))
     """Of the commanded joint angles from the path at its start, rad."""
@@ -76,18 +89,26 @@ class ArmMotion(LeafSystem):
         position: commanded joint angles [7], rad; velocity and acceleration are continuous.
         phase: ArmPhase.
         interaction_step: int, how many pushes are over.
-        active_push: the Push that is being done, or None.
+        active_push: the Push that is being done, or waits for permission, or None.
         tried_pushes: tuple of TriedPush.
+
+    `permit` is asked about every push, again and again while it says WAIT; without it each is done.
 
     No output depends on an input at the same moment: `tried_pushes` and `position` may be wired back to
     the planner.
     """
 
-    def __init__(self, q_observe: NDArray, parameters: ArmMotionParameters | None = None):
+    def __init__(
+        self,
+        q_observe: NDArray,
+        parameters: ArmMotionParameters | None = None,
+        permit: Callable[[Push], Permission] | None = None,
+    ):
         super().__init__()
         self.set_name("ArmMotion")
         self._q_observe = np.array(q_observe, float)
         self._parameters = parameters or ArmMotionParameters()
+        self._permit = permit
         anything = Value[object](None)
         self._push = self.DeclareAbstractInputPort("push", anything)
         self._pair = self.DeclareAbstractInputPort("pair", anything)
@@ -99,7 +120,7 @@ class ArmMotion(LeafSystem):
         self.DeclareVectorOutputPort("position", 7, self._calc_position, with_time)
         self._declare("phase", self._calc_phase, with_time)
         self._declare("interaction_step", lambda m, t: m.interaction_step, state)
-        self._declare("active_push", lambda m, t: m.push, state)
+        self._declare("active_push", lambda m, t: m.push or m.proposed, state)
         self._declare("tried_pushes", lambda m, t: m.tried, state)
         self.DeclarePeriodicUnrestrictedUpdateEvent(self._parameters.period, 0.0, self._update)
 
@@ -146,6 +167,8 @@ class ArmMotion(LeafSystem):
             return memory
         if memory.push is not None:
             return self._after_motion(memory, time)
+        if memory.proposed is not None:
+            return self._ask(memory, time)
 
         error = np.abs(self._measured.Eval(context) - self._q_observe).max()
         if error > parameters.rest_tolerance:
@@ -168,16 +191,35 @@ class ArmMotion(LeafSystem):
             return replace(
                 memory, asked=pair.current.sequence, nulls=nulls, done=nulls >= parameters.null_frames
             )
-        return replace(
+        proposal = replace(
             memory,
-            push=push,
-            start_time=time,
-            offset=self._offset_from(push),
-            rest_since=None,
+            proposed=push,
             asked=pair.current.sequence,
             nulls=0,
             segmented_before=self._segmented(pair, context),
         )
+        return self._ask(proposal, time)
+
+    def _ask(self, memory: _Memory, time: float) -> _Memory:
+        """Begin with the proposed push, if that is permitted."""
+        push = memory.proposed
+        assert push is not None
+        match Permission.DO if self._permit is None else self._permit(push):
+            case Permission.DO:
+                return replace(
+                    memory,
+                    proposed=None,
+                    push=push,
+                    start_time=time,
+                    offset=self._offset_from(push),
+                    rest_since=None,
+                )
+            case Permission.SKIP:
+                tried = TriedPush(push.p_WB, push.direction_W, changed=False)
+                return replace(memory, proposed=None, tried=(*memory.tried, tried))
+            case Permission.END:
+                return replace(memory, proposed=None, done=True)
+        return memory
 
     def _after_motion(self, memory: _Memory, time: float) -> _Memory:
         assert memory.push is not None

@@ -1,0 +1,68 @@
+"""From where the arm stands to where it looks from, and other motions that no push needs."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.trajectories import PiecewisePolynomial
+
+from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest
+from riseg_drake.robot.kinematics import PandaKinematics
+from riseg_drake.robot.supervisor import Mode
+from riseg_drake.stations.command_process import CommandProcess
+from riseg_drake.stations.hardware import TARGET_PERIOD
+
+ARRIVED = 0.01
+"""The arm is where it should be when every joint is this close, rad."""
+LINGER = 1.0
+"""Targets go on for this long at the end of a motion, s: the last ones are never reached."""
+ROOM = 0.01
+"""Arm and tool keep this far from the table and from each other on the way, m."""
+
+
+class TravelError(RuntimeError):
+    """The arm does not get there; says in one line why."""
+
+
+def straight_motion(
+    kinematics: PandaKinematics, q_from: NDArray, q_to: NDArray, limits: SpeedLimits
+) -> PiecewisePolynomial:
+    """From rest to rest on the straight line between two postures [7]. Raises TravelError if it is not free."""
+    steps = max(int(np.ceil(np.abs(q_to - q_from).max() / 0.03)), 4)
+    way = q_from + np.linspace(0, 1, steps + 1)[:, None] * (q_to - q_from)
+    if min(kinematics.clearance(q) for q in way[1:]) < ROOM:
+        raise TravelError(
+            "the straight way to the observation posture comes too near to the table or to the arm itself; "
+            "guide the arm by hand to nearer to it, tool down and well above the objects"
+        )
+    return rest_to_rest(way, minimum_jerk, limits)
+
+
+def travel(
+    commands: CommandProcess,
+    motion: PiecewisePolynomial,
+    look: Callable[[], None] = lambda: None,
+) -> None:
+    """Have a motion done, and wait until the arm has arrived; `look` is called all the while.
+
+    Raises TravelError if the arm is stopped on its way.
+    """
+    start, duration = time.time(), motion.end_time()
+    for t in np.arange(0, duration + LINGER, TARGET_PERIOD):
+        commands.send_target(start + t, motion.value(min(t, duration))[:, 0])
+    goal = motion.value(duration)[:, 0]
+    deadline = time.monotonic() + duration + 15
+    while time.monotonic() < deadline:
+        look()
+        time.sleep(0.02)
+        report = commands.report
+        if report is None:
+            continue
+        if report.state.mode in (Mode.STOPPED, Mode.ENDED):
+            raise TravelError(f"the arm was stopped: {report.state.cause.value}")
+        arrived = report.status is not None and np.abs(report.status.position - goal).max() < ARRIVED
+        if arrived and report.behind == 0 and report.at_rest and time.time() > start + duration + LINGER:
+            return
+    cause = report.state.cause.value or "it did not arrive in time" if report else "it says nothing"
+    raise TravelError(f"the arm did not get to where it should: {cause}")

@@ -1,0 +1,58 @@
+"""A dry run: every push is shown, with the way of the tip, and none is done."""
+
+import time
+
+import numpy as np
+from pydrake.geometry import Meshcat, Rgba
+from rich.console import Console
+
+from riseg_drake.app.scenario import Scenario
+from riseg_drake.app.terminal_operator import TerminalOperator
+from riseg_drake.pushing.push import Push
+from riseg_drake.robot.kinematics import PandaKinematics
+from riseg_drake.systems.arm_motion import Permission
+
+SHOWN_FOR = 2.0
+"""A push is shown for this long when nobody is asked, s."""
+
+
+class DryRun:
+    """A dry run's permission: every push is shown, with the way of the tip, and none is done."""
+
+    def __init__(
+        self, scenario: Scenario, meshcat: Meshcat | None, operator: TerminalOperator | None, console: Console
+    ):
+        self._kinematics = PandaKinematics(scenario.hardware.panda)
+        self._most = scenario.arm.most_interactions
+        self._meshcat, self._operator, self._console = meshcat, operator, console
+        self._push: Push | None = None
+        self._since = 0.0
+        self._shown = 0
+
+    def permit(self, push: Push) -> Permission:
+        """SKIP once it was looked at, END after as many as a run would have."""
+        if push is not self._push:
+            self._push, self._since = push, time.monotonic()
+            self._shown += 1
+            self._draw(push)
+        if self._operator is None:
+            if time.monotonic() - self._since < SHOWN_FOR:
+                return Permission.WAIT
+        else:
+            said = self._operator.answer(f"push {self._shown}: n for another, q to end", "n q")
+            if said != "n":
+                return Permission.WAIT if not said else Permission.END
+        return Permission.SKIP if self._shown < self._most else Permission.END
+
+    def _draw(self, push: Push) -> None:
+        assert push.path is not None
+        times = np.linspace(0, push.path.duration, 200)
+        way = np.array([self._kinematics.X_WE(push.path.position(t))[:3, 3] for t in times])
+        lowest = min(self._kinematics.clearance(push.path.position(t)) for t in times[::4])
+        x, y = push.p_WB[:2]
+        self._console.print(
+            f"push {self._shown} at ({x:.3f}, {y:.3f}) m, {push.path.duration:.1f} s, nothing nearer than "
+            f"{1e3 * lowest:.0f} mm to table or arm"
+        )
+        if self._meshcat is not None:
+            self._meshcat.SetLine("/riseg/planned_way", way.T, 3.0, Rgba(0.84, 0.37, 0.0))

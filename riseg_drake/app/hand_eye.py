@@ -1,0 +1,131 @@
+"""`riseg hand-eye`: is the camera where the scenario says? The arm moves over a scene that stands still."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from riseg_drake.app.arm_travel import straight_motion, travel
+from riseg_drake.app.hardware import HardwareError, check_limits, listening, wait_for_drivers
+from riseg_drake.app.scenario import HARDWARE, load_scenario
+from riseg_drake.app.scenario_file import ScenarioError
+from riseg_drake.app.terminal_operator import TerminalOperator
+from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.recording.whole_file import write_png
+from riseg_drake.robot.kinematics import PandaKinematics, observation_posture, tip_pointing_down
+from riseg_drake.robot.silhouette import RobotSilhouette
+from riseg_drake.segmentation.above_table import objects_above_table
+from riseg_drake.segmentation.hand_eye import draw_flow_error, flow_errors, verdict
+from riseg_drake.stations.command_process import CommandProcess
+from riseg_drake.stations.hardware import HardwareStationConfig, as_drake_images
+from riseg_drake.stations.lcm_images import decode_images
+from riseg_drake.stations.lcm_reception import Reception
+
+OFFSETS = ((0.04, 0.0, 0.0), (0.0, 0.04, 0.1), (-0.04, 0.0, 0.0), (0.0, -0.04, -0.1), (0.0, 0.0, 0.0))
+"""Where the tip goes from the observation posture, x and y in W, m, and by how much it turns, rad."""
+SLOWER = 0.3
+"""The arm moves at this share of the speed of other planned motions."""
+
+
+def hand_eye_command(scenario_file: Path | None, output: Path | None, yes: bool, console: Console) -> None:
+    """Move, compare the flows, print the verdict, and leave pictures."""
+    scenario = load_scenario(scenario_file, HARDWARE)
+    config = scenario.hardware
+    check_limits(scenario)
+    kinematics = PandaKinematics(config.panda)
+    postures = _postures(kinematics, config)
+    limits = scenario.push.path.limits
+    operator = TerminalOperator(console, yes)
+    with listening(config, replayed=False, truth=False) as (reception, _):
+        wait_for_drivers(reception, config)
+        camera = _Collector(reception, config, kinematics)
+        with CommandProcess(config.lcm, config.command, config.panda) as commands:
+            operator.confirm("the arm goes to where it looks from, and 4 cm around; nothing else may move")
+            assert reception.status is not None
+            here = reception.status.position
+            for index, q in enumerate(postures):
+                # The way there is not of interest; the moves after it are slow, for enough pictures.
+                motion = straight_motion(kinematics, here, q, limits)
+                if index:
+                    motion.ScaleTime(1 / SLOWER)
+                travel(commands, motion, camera.look if index else lambda: None)
+                here = q
+    errors = flow_errors(camera.frames)
+    if not errors:
+        raise HardwareError(
+            f"{len(camera.frames)} pictures came, with too little texture or depth in them to compare; "
+            "put patterned things on the table"
+        )
+    median, words = verdict(errors)
+    shift_u, shift_v = np.median([error.mean for error in errors], axis=0)
+    folder = output or Path("out") / "hand_eye"
+    folder.mkdir(parents=True, exist_ok=True)
+    for index, error in enumerate(errors[:: max(len(errors) // 5, 1)]):
+        write_png(folder / f"flow_{index}.png", draw_flow_error(error))
+    plane_W = objects_above_table(camera.frames[-1], scenario.above_table).plane_W
+    tilt = np.degrees(np.arccos(np.clip(plane_W[2], -1, 1)))
+    console.print(
+        f"hand-eye: observed and expected flow differ by {median:.2f} pixels (median of {len(errors)} pairs; "
+        f"shared by all pixels: {shift_u:+.2f}, {shift_v:+.2f}): {words}"
+    )
+    console.print(
+        f"table: {-1e3 * plane_W[3]:.1f} mm high and tilted by {tilt:.2f} degrees in the arm's base frame; "
+        "both should be near 0"
+    )
+    console.print(f"arrows of both flows in {folder}: expected blue, observed orange")
+
+
+class _Collector:
+    """Keeps every picture with the arm's pose of its time."""
+
+    def __init__(self, reception: Reception, config: HardwareStationConfig, kinematics: PandaKinematics):
+        self._reception, self._config, self._kinematics = reception, config, kinematics
+        self._silhouette = RobotSilhouette(kinematics, config.camera.intrinsics)
+        self._newest = time.time()
+        self.frames: list[Frame] = []
+
+    def look(self) -> None:
+        """Take in the newest picture, if there is another."""
+        message = self._reception.newest_picture(after=self._newest)
+        if message is None:
+            return
+        images = decode_images(message)
+        arm = self._reception.state_at(images.time - self._config.camera.latency)
+        if arm is None:
+            return
+        self._newest = message.header.utime * 1e-6
+        color, depth = as_drake_images(images, self._config.camera)
+        self.frames.append(
+            Frame(
+                sequence=len(self.frames),
+                time=images.time,
+                intrinsics=self._config.camera.intrinsics,
+                color=color.data[..., :3].copy(),
+                depth=depth.data[..., 0].copy(),
+                X_WC=self._kinematics.X_WC(arm[0]),
+                robot=self._silhouette.mask(arm[0]),
+            )
+        )
+
+
+def _postures(kinematics: PandaKinematics, config: HardwareStationConfig) -> list[np.ndarray]:
+    try:
+        q = observation_posture(kinematics, config.centre_W, config.observe_height, config.start_position)
+    except ValueError as error:
+        raise ScenarioError(str(error)) from None
+    X_WE = kinematics.X_WE(q)
+    yaw = float(np.arctan2(X_WE[1, 0], X_WE[0, 0]))
+    postures = [q]
+    for x, y, turn in OFFSETS:
+        traced = kinematics.trace_ik(
+            [
+                tip_pointing_down(X_WE[:3, 3] + share * np.array([x, y, 0.0]), yaw + share * turn)
+                for share in (0.5, 1.0)
+            ],
+            q,
+        )
+        if traced is None:
+            raise ScenarioError("centre_W, observe_height: the arm cannot move by 4 cm there")
+        postures.append(traced[-1])
+    return postures

@@ -1,0 +1,213 @@
+"""From wishes to commands that a real arm accepts: one small step every 5 ms, whatever is wished for.
+
+The commands are samples of one trajectory that is twice continuously differentiable, with constant jerk or
+Ruckig's between two samples. So velocity, acceleration and jerk as differences of the commands themselves,
+which is how the arm judges them, are means of the trajectory's and keep its limits.
+
+A wish near to where the trajectory is, such as the next point of a planned path, is followed by a linear
+law, which does not chatter; Ruckig, fastest within limits, brings the trajectory there from anywhere else.
+A step is only taken if the arm can come to rest after it within the joints' ranges: that stop is kept
+ready, and is all that happens when there is nothing to follow, or nothing that may be.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from ruckig import (
+    ControlInterface,
+    InputParameter,
+    Result,
+    Ruckig,
+    Synchronization,
+    Trajectory,
+)
+
+from riseg_drake.robot.limits import PANDA_LIMITS, PandaLimits
+
+
+@dataclass
+class CommandLimits:
+    """Shares of the published limits of the joints that commands may use."""
+
+    velocity: float = 0.4
+    acceleration: float = 0.4
+    jerk: float = 0.25
+    stop_acceleration: float = 0.8
+    """While the arm comes to a stop; more than in motion, so that it stops soon."""
+    stop_jerk: float = 0.5
+    position_margin: float = 0.03
+    """Room that commands keep to the ends of the joints' ranges, rad; less than planned paths do."""
+
+    def __post_init__(self) -> None:
+        for name in ("velocity", "acceleration", "jerk", "stop_acceleration", "stop_jerk"):
+            share = getattr(self, name)
+            if not 0 < share <= 1:
+                raise ValueError(
+                    f"{name} is a share of the arm's limit, more than 0 and at most 1, not {share}"
+                )
+        if self.stop_acceleration < self.acceleration or self.stop_jerk < self.jerk:
+            raise ValueError("a stop must be allowed at least the acceleration and jerk of other motions")
+
+    def longest_stop(self, robot: PandaLimits = PANDA_LIMITS) -> float:
+        """No stop takes longer than this, s: from full speed, and full acceleration the wrong way."""
+        v, a = self.velocity * robot.velocity, self.acceleration * robot.acceleration
+        a_stop, j_stop = self.stop_acceleration * robot.acceleration, self.stop_jerk * robot.jerk
+        turning = a / j_stop
+        faster = v + a * turning / 2
+        return float(np.max(turning + faster / a_stop + a_stop / j_stop))
+
+
+class Target(NamedTuple):
+    """What to be at one period from now: joint angles, rad, and their first two derivatives, each [7]."""
+
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
+
+
+class CommandLimiter:
+    """The trajectory of the commands, advanced by one period at a time. Knows no clock.
+
+    `position`, `velocity`, `acceleration` are where it is now, each [7]; it begins at rest.
+    """
+
+    BANDWIDTH = 60.0
+    """How fast the linear law closes a gap, rad/s: within some 50 ms."""
+
+    def __init__(
+        self,
+        position: NDArray,
+        period: float = 0.005,
+        limits: CommandLimits | None = None,
+        robot: PandaLimits = PANDA_LIMITS,
+    ):
+        limits = limits or CommandLimits()
+        self._period = period
+        self._velocity_limit = limits.velocity * robot.velocity
+        self._acceleration_limit = limits.acceleration * robot.acceleration
+        self._jerk_limit = limits.jerk * robot.jerk
+        self._lower = robot.position_lower + limits.position_margin
+        self._upper = robot.position_upper - limits.position_margin
+        self._otg = Ruckig(7, period)
+        self._way = InputParameter(7)
+        self._way.max_velocity = list(self._velocity_limit)
+        self._way.max_acceleration = list(self._acceleration_limit)
+        self._way.max_jerk = list(self._jerk_limit)
+        self._braking = InputParameter(7)
+        self._braking.control_interface = ControlInterface.Velocity
+        self._braking.synchronization = Synchronization.Phase  # straight on, where that is possible
+        self._braking.max_acceleration = list(limits.stop_acceleration * robot.acceleration)
+        self._braking.max_jerk = list(limits.stop_jerk * robot.jerk)
+        self._braking.target_velocity = [0.0] * 7
+        self.restart(position)
+
+    def restart(self, position: NDArray) -> None:
+        """Be at rest at `position` [7], rad: for the first command, which is where the arm is."""
+        self.position = np.array(position, np.float64)
+        self.velocity = np.zeros(7)
+        self.acceleration = np.zeros(7)
+        self.held_back = False
+        """Whether the last wish led out of the joints' ranges and the arm came to a stop instead."""
+        self._stop, self._stopped_for = self._stop_from(self.position, self.velocity, self.acceleration), 0.0
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing moves, to well below what a position can be told."""
+        return bool(np.abs(self.velocity).max() < 1e-6 and np.abs(self.acceleration).max() < 1e-3)
+
+    @property
+    def rest_position(self) -> NDArray[np.float64]:
+        """Where the arm would come to rest if it stopped now, rad [7]."""
+        return np.array(self._stop.at_time(self._stop.duration)[0])
+
+    def follow(self, target: Target) -> NDArray[np.float64]:
+        """Advance by one period towards a target; returns the command, rad [7]."""
+        target = self._within_ranges(target)
+        candidate = self._follow_linearly(target) or self._approach(target)
+        if candidate is not None:
+            stop = self._stop_from(*candidate)
+            if self._keeps_to_ranges(stop):
+                self.position, self.velocity, self.acceleration = candidate
+                self._stop, self._stopped_for, self.held_back = stop, 0.0, False
+                return self.position
+        self.held_back = True
+        return self.stop()
+
+    def stop(self) -> NDArray[np.float64]:
+        """Advance by one period of coming to rest; returns the command, rad [7]."""
+        self._stopped_for += self._period
+        if self._stopped_for >= self._stop.duration:
+            self.position = self.rest_position
+            self.velocity, self.acceleration = np.zeros(7), np.zeros(7)
+        else:
+            self.position, self.velocity, self.acceleration = map(
+                np.array, self._stop.at_time(self._stopped_for)[:3]
+            )
+        return self.position
+
+    def _within_ranges(self, target: Target) -> Target:
+        """The nearest target in the joints' ranges; it stands still in the joints that had to be moved."""
+        position = np.clip(target.position, self._lower, self._upper)
+        inside = position == target.position
+        return Target(position, target.velocity * inside, target.acceleration * inside)
+
+    def _follow_linearly(self, target: Target) -> tuple[NDArray, NDArray, NDArray] | None:
+        """The state after one period of the jerk that brings the target, None if that breaks a limit."""
+        T, w = self._period, self.BANDWIDTH
+        # Errors against where one gets to without jerk: their decay is that of three equal poles.
+        free_velocity = self.velocity + T * self.acceleration
+        free_position = self.position + T * self.velocity + T**2 / 2 * self.acceleration
+        jerk = (
+            w**3 * (target.position - free_position)
+            + 3 * w**2 * (target.velocity - free_velocity)
+            + 3 * w * (target.acceleration - self.acceleration)
+        )
+        acceleration = self.acceleration + T * jerk
+        velocity = free_velocity + T**2 / 2 * jerk
+        # The speed that is still gathered while the acceleration is taken back.
+        coming = velocity + acceleration * np.abs(acceleration) / (2 * self._jerk_limit)
+        if (
+            (np.abs(jerk) > self._jerk_limit).any()
+            or (np.abs(acceleration) > self._acceleration_limit).any()
+            or (np.abs(velocity) > self._velocity_limit).any()
+            or (np.abs(coming) > self._velocity_limit).any()
+        ):
+            return None
+        return free_position + T**3 / 6 * jerk, velocity, acceleration
+
+    def _approach(self, target: Target) -> tuple[NDArray, NDArray, NDArray] | None:
+        """The state after one period of Ruckig's fastest way to the target, None where it finds none."""
+        room = 0.999 * self._velocity_limit  # Ruckig wants a target that could be left again
+        self._way.current_position = list(self.position)
+        self._way.current_velocity = list(self.velocity)
+        self._way.current_acceleration = list(self.acceleration)
+        self._way.target_position = list(target.position)
+        self._way.target_velocity = list(np.clip(target.velocity, -room, room))
+        self._way.target_acceleration = [0.0] * 7
+        way = Trajectory(7)
+        # Not `update`, which takes an input that did not change for one that it has answered already.
+        if self._otg.calculate(self._way, way) not in (Result.Working, Result.Finished):
+            return None
+        position, velocity, acceleration = way.at_time(self._period)[:3]
+        return np.array(position), np.array(velocity), np.array(acceleration)
+
+    def _stop_from(self, position: NDArray, velocity: NDArray, acceleration: NDArray) -> Trajectory:
+        self._braking.current_position = list(position)
+        self._braking.current_velocity = list(velocity)
+        self._braking.current_acceleration = list(acceleration)
+        stop = Trajectory(7)
+        result = self._otg.calculate(self._braking, stop)
+        if result not in (Result.Working, Result.Finished):
+            raise RuntimeError(f"no stop from {position}, {velocity}, {acceleration}: {result}")
+        return stop
+
+    def _keeps_to_ranges(self, stop: Trajectory) -> bool:
+        """Whether a stop ends in the joints' ranges, or not further outside than it began.
+
+        On its way there it goes beyond both by micrometres at most, which is what the margin is for.
+        """
+        start, end = np.array(stop.at_time(0.0)[0]), np.array(stop.at_time(stop.duration)[0])
+        lower, upper = np.minimum(self._lower, start), np.maximum(self._upper, start)
+        return bool(((lower - 1e-9 <= end) & (end <= upper + 1e-9)).all())

@@ -1,0 +1,266 @@
+"""The real arm and camera behind the ports of `contract.py`, by way of their drivers on LCM.
+
+What the ports show is of one instant, that of the newest picture: `panda.position_measured` is where the arm
+was when it was taken. So whoever pairs the two cannot do it wrong, however late a picture comes; what must
+know where the arm is now, which is the process that sends commands, listens to the arm itself.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.value import AbstractValue, Value
+from pydrake.geometry import Meshcat, MeshcatVisualizer, SceneGraph
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    Diagram,
+    DiagramBuilder,
+    EventStatus,
+    LeafSystem,
+    OutputPort,
+    State,
+)
+from pydrake.systems.rendering import MultibodyPositionToGeometryPose
+from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
+
+from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.robot.command_stream import CommandParameters
+from riseg_drake.robot.description import PandaDescription, add_panda
+from riseg_drake.stations.lcm_channels import LcmConfig
+from riseg_drake.stations.lcm_images import ImageError, LcmImages, decode_images
+from riseg_drake.stations.lcm_reception import Reception
+
+TARGET_PERIOD = 0.01
+"""Time between two targets for the arm, s; the process that sends commands puts a cubic between them."""
+
+
+@dataclass
+class HardwareCameraConfig:
+    """The RealSense camera, as its driver was started."""
+
+    width: int = 640
+    """Columns used, from the middle of the picture; 0: all of them. px"""
+    fx: float = 616.285
+    """Of the whole picture, as the driver calibrates it; px."""
+    fy: float = 615.778
+    """px"""
+    cx: float = 405.418
+    """px; a picture of which only the middle is used need not be thought of."""
+    cy: float = 232.864
+    """px"""
+    full_width: int = 848
+    """Size of the pictures that the driver sends, px."""
+    full_height: int = 480
+    """px"""
+    rate: float = 15.0
+    """Pictures looked at in a second, at most; fewer where the computer is busy."""
+    latency: float = 0.0
+    """A picture shows where the arm was this long before the picture's stamp, s."""
+    depth_min: float = 0.3
+    """Nearest depth that is believed, m."""
+    depth_max: float = 3.0
+    """Farthest depth that is believed, m."""
+
+    @property
+    def first_column(self) -> int:
+        """Where the part that is used begins, px."""
+        return (self.full_width - (self.width or self.full_width)) // 2
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """The pinhole of the part that is used."""
+        width = self.width or self.full_width
+        return Intrinsics(width, self.full_height, self.fx, self.fy, self.cx - self.first_column, self.cy)
+
+
+@dataclass
+class HardwareStationConfig:
+    """Everything that has to be said about a robot."""
+
+    panda: PandaDescription = field(default_factory=PandaDescription)
+    camera: HardwareCameraConfig = field(default_factory=HardwareCameraConfig)
+    lcm: LcmConfig = field(default_factory=LcmConfig)
+    command: CommandParameters = field(default_factory=CommandParameters)
+    centre_W: list[float] = field(default_factory=lambda: [0.5, 0.0])
+    """Middle of the work area on the table, x and y in W, m; the camera looks down at it between pushes."""
+    observe_height: float = 0.5
+    """Height of the camera above it then, m."""
+    start_position: list[float] = field(default_factory=list)
+    """Joint angles to look from instead, rad, 7; empty: as the two lines above say."""
+
+
+class TargetSink(Protocol):
+    """Who moves the arm."""
+
+    def send_target(self, time: float, position: NDArray) -> None:
+        """Joint angles [7], rad, to be at about the wall time `time`, s."""
+
+
+class HardwareStation(Diagram):
+    """Behind its ports are the drivers. The context's time must be wall time.
+
+    Without `sink` nothing is moved: what comes in at `panda.position` is ignored. `clock` gives wall time, s.
+    Raises ImageError when a picture comes that the camera's driver, as it was started, cannot give.
+    """
+
+    def __init__(
+        self,
+        config: HardwareStationConfig,
+        reception: Reception,
+        sink: TargetSink | None = None,
+        clock: Callable[[], float] = time.time,
+        meshcat: Meshcat | None = None,
+    ):
+        super().__init__()
+        builder = DiagramBuilder()
+        view = builder.AddSystem(LcmView(config.camera, reception, clock))
+        targets = builder.AddSystem(Targets(sink))
+        builder.ExportInput(targets.get_input_port(), "panda.position")
+        for name, port in LcmView.PORTS.items():
+            builder.ExportOutput(view.GetOutputPort(port), name)
+        if meshcat is not None:
+            _add_arm_view(builder, config.panda, view.GetOutputPort("position"), meshcat)
+        builder.BuildInto(self)
+        self.set_name("station")
+
+
+def _add_arm_view(
+    builder: DiagramBuilder, panda: PandaDescription, position: OutputPort, meshcat: Meshcat
+) -> None:
+    """Show the arm in the browser where it was measured to be."""
+    plant = MultibodyPlant(0.0)
+    scene_graph = builder.AddSystem(SceneGraph())
+    plant.RegisterAsSourceForSceneGraph(scene_graph)
+    add_panda(plant, panda)
+    plant.Finalize()
+    poses = builder.AddSystem(MultibodyPositionToGeometryPose(plant))
+    builder.Connect(position, poses.get_input_port())
+    builder.Connect(poses.get_output_port(), scene_graph.get_source_pose_port(plant.get_source_id()))
+    MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
+
+
+class Targets(LeafSystem):
+    """Hands the joint angles at its input on, with the time that they are meant for."""
+
+    def __init__(self, sink: TargetSink | None):
+        super().__init__()
+        self.set_name("targets")
+        self._sink = sink
+        self._position = self.DeclareVectorInputPort("position", 7)
+        self.DeclarePeriodicPublishEvent(TARGET_PERIOD, 0.0, self._publish)
+
+    def _publish(self, context: Context) -> EventStatus:
+        if self._sink is None:
+            return EventStatus.DidNothing()
+        self._sink.send_target(context.get_time(), self._position.Eval(context))
+        return EventStatus.Succeeded()
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """What the ports show. Never changed, only replaced."""
+
+    color: ImageRgba8U
+    depth: ImageDepth32F
+    time: float
+    sent: float
+    """The message's own stamp, s, which tells whether another is newer."""
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "_Shown":
+        return self
+
+
+class LcmView(LeafSystem):
+    """The newest picture, and the arm at the time it was taken; looks for a newer one at the camera's rate.
+
+    When the diagram's time is behind the clock by more than a period, because segmentation takes longer
+    than that, it shows no newer picture until the diagram has caught up: pictures are skipped, time is not.
+    """
+
+    PORTS: ClassVar[dict[str, str]] = {
+        "wrist.color_image": "color_image",
+        "wrist.depth_image": "depth_image",
+        "wrist.image_time": "image_time",
+        "panda.position_measured": "position",
+        "panda.velocity_measured": "velocity",
+    }
+    """By their names at the station."""
+
+    def __init__(self, config: HardwareCameraConfig, reception: Reception, clock: Callable[[], float]):
+        super().__init__()
+        self.set_name("drivers")
+        self._config, self._reception, self._clock = config, reception, clock
+        nothing = _Shown(ImageRgba8U(), ImageDepth32F(), -1.0, -np.inf, np.zeros(7), np.zeros(7))
+        self._state = self.DeclareAbstractState(Value[object](nothing))
+        ticket = {self.abstract_state_ticket(self._state)}
+        self.DeclareAbstractOutputPort(
+            "color_image",
+            lambda: AbstractValue.Make(ImageRgba8U()),
+            lambda context, output: output.set_value(self._shown(context).color),
+            ticket,
+        )
+        self.DeclareAbstractOutputPort(
+            "depth_image",
+            lambda: AbstractValue.Make(ImageDepth32F()),
+            lambda context, output: output.set_value(self._shown(context).depth),
+            ticket,
+        )
+        self.DeclareVectorOutputPort("image_time", 1, self._calc_time, ticket)
+        self.DeclareVectorOutputPort("position", 7, self._calc_position, ticket)
+        self.DeclareVectorOutputPort("velocity", 7, self._calc_velocity, ticket)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(1 / config.rate, 0.0, self._look)
+
+    def _shown(self, context: Context) -> _Shown:
+        return context.get_abstract_state(int(self._state)).get_value()
+
+    def _calc_time(self, context: Context, output: BasicVector) -> None:
+        output.SetAtIndex(0, self._shown(context).time)
+
+    def _calc_position(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._shown(context).position)
+
+    def _calc_velocity(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._shown(context).velocity)
+
+    def _look(self, context: Context, state: State) -> EventStatus:
+        shown = self._shown(context)
+        if self._clock() - context.get_time() > 1 / self._config.rate:
+            return EventStatus.DidNothing()
+        message = self._reception.newest_picture(after=shown.sent)
+        if message is None:
+            return EventStatus.DidNothing()
+        images = decode_images(message)
+        taken = images.time + self._reception.offset
+        arm = self._reception.state_at(taken - self._config.latency)
+        if arm is None or taken <= shown.time:
+            return EventStatus.DidNothing()
+        color, depth = as_drake_images(images, self._config)
+        sent = message.header.utime * 1e-6 + self._reception.offset
+        following = _Shown(color, depth, taken, sent, *arm)
+        state.get_mutable_abstract_state(int(self._state)).set_value(following)
+        return EventStatus.Succeeded()
+
+
+def as_drake_images(images: LcmImages, config: HardwareCameraConfig) -> tuple[ImageRgba8U, ImageDepth32F]:
+    """The part of a picture that is used, and where its depth is believed. Raises ImageError."""
+    height, width = images.depth.shape
+    if (width, height) != (config.full_width, config.full_height):
+        raise ImageError(
+            f"the camera sends {width}x{height} pixels, and the scenario's intrinsics are for "
+            f"{config.full_width}x{config.full_height}"
+        )
+    columns = slice(config.first_column, width - config.first_column)
+    cropped = images.depth[:, columns]
+    color = ImageRgba8U(cropped.shape[1], height)
+    color.mutable_data[..., :3] = images.color[:, columns]
+    color.mutable_data[..., 3] = 255
+    depth = ImageDepth32F(cropped.shape[1], height)
+    depth.mutable_data[..., 0] = cropped * ((cropped >= config.depth_min) & (cropped <= config.depth_max))
+    return color, depth

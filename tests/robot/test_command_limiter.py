@@ -1,0 +1,106 @@
+import numpy as np
+import pytest
+
+from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest
+from riseg_drake.robot.command_limiter import CommandLimiter, CommandLimits, Target
+from riseg_drake.robot.kinematics import READY
+from riseg_drake.robot.limits import PANDA_LIMITS
+
+PERIOD = 0.005
+
+
+def shares(positions):
+    """Largest velocity, acceleration and jerk of a sequence of commands [N, 7], as shares of the limits."""
+    return [
+        float(np.max(np.abs(np.diff(positions, order, axis=0)) / PERIOD**order / limit))
+        for order, limit in enumerate(
+            (PANDA_LIMITS.velocity, PANDA_LIMITS.acceleration, PANDA_LIMITS.jerk), start=1
+        )
+    ]
+
+
+def still(position):
+    return Target(np.asarray(position, float), np.zeros(7), np.zeros(7))
+
+
+def until_rest(limiter, target, most=3000):
+    commands = [limiter.position.copy()]
+    for _ in range(most):
+        commands.append(limiter.follow(target).copy())
+        if limiter.at_rest and np.abs(limiter.position - target.position).max() < 1e-6:
+            return np.array(commands)
+    raise AssertionError("never there")
+
+
+def test_the_first_commands_are_where_the_arm_is():
+    limiter = CommandLimiter(READY)
+    np.testing.assert_array_equal(limiter.follow(still(READY)), READY)
+    np.testing.assert_array_equal(limiter.stop(), READY)
+
+
+def test_a_planned_motion_comes_out_as_it_went_in():
+    rng = np.random.default_rng(0)
+    way = READY + np.cumsum(rng.normal(scale=0.08, size=(10, 7)), axis=0)
+    path = rest_to_rest(way, minimum_jerk, SpeedLimits(0.3, 0.25, 0.1))
+    limiter = CommandLimiter(way[0])
+    for t in np.arange(PERIOD, path.end_time(), PERIOD):
+        target = Target(*(path.EvalDerivative(t, order)[:, 0] for order in range(3)))
+        np.testing.assert_allclose(limiter.follow(target), target.position, rtol=0, atol=2e-5)
+
+
+def test_a_step_becomes_a_motion_within_limits_that_arrives():
+    limits = CommandLimits()
+    commands = until_rest(CommandLimiter(READY, PERIOD, limits), still(READY + 0.5))
+    velocity, acceleration, jerk = shares(np.vstack([READY, READY, commands, commands[-1], commands[-1]]))
+    assert velocity <= limits.velocity + 1e-6
+    assert acceleration <= limits.acceleration + 1e-6
+    assert jerk <= limits.jerk + 1e-4
+
+
+def test_a_target_beyond_a_joint_is_not_followed_out_of_its_range():
+    limiter = CommandLimiter(READY)
+    beyond = PANDA_LIMITS.position_upper + 1
+    for _ in range(1500):
+        limiter.follow(still(beyond))
+    room = PANDA_LIMITS.room(limiter.position)
+    assert room.min() >= CommandLimits().position_margin - 1e-6
+    assert limiter.at_rest
+
+
+def test_a_target_that_races_towards_the_end_of_a_range_is_given_up_in_time():
+    limiter = CommandLimiter(READY)
+    racing = np.zeros(7)
+    racing[5] = CommandLimits().velocity * PANDA_LIMITS.velocity[5]
+    held_back = False
+    for k in range(1000):
+        position = READY + racing * k * PERIOD
+        limiter.follow(Target(position, racing, np.zeros(7)))
+        held_back |= limiter.held_back
+        assert PANDA_LIMITS.contains(limiter.position)
+    assert held_back
+
+
+def test_the_longest_stop_is_no_longer_than_said():
+    limits = CommandLimits()
+    longest = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        limiter = CommandLimiter(READY, PERIOD, limits)
+        goal = READY + rng.choice([-0.5, 0.5], 7)
+        for _ in range(rng.integers(1, 120)):
+            limiter.follow(still(goal))
+        periods = 0
+        while not limiter.at_rest:
+            limiter.stop()
+            periods += 1
+        longest = max(longest, periods)
+    assert longest * PERIOD <= limits.longest_stop() + PERIOD
+    assert longest * PERIOD > 0.05  # the test has seen real stops
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"velocity": 0.0}, {"jerk": 1.5}, {"acceleration": 0.9, "stop_acceleration": 0.5}]
+)
+def test_shares_that_cannot_be_are_refused(wrong):
+    with pytest.raises(ValueError, match=r"share|stop"):
+        CommandLimits(**wrong)

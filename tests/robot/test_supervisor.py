@@ -1,0 +1,129 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from riseg_drake.robot.supervisor import (
+    MOVE,
+    REFLEX,
+    USER_STOPPED,
+    Cause,
+    Mode,
+    Observation,
+    SafetyParameters,
+    SafetyState,
+    ended,
+    released,
+    supervise,
+)
+
+GOOD = Observation(
+    now=10.0,
+    status_time=9.99,
+    robot_mode=MOVE,
+    image_time=9.9,
+    in_motion=True,
+    contact_planned=False,
+    tip_force=2.0,
+    p_WE=np.array([0.5, 0.0, 0.1]),
+    held_back=False,
+    lag=0.01,
+    gap=0.0,
+)
+FOLLOWING = SafetyState(Mode.FOLLOWING)
+PARAMETERS = SafetyParameters()
+
+
+def after(state=FOLLOWING, **seen):
+    return supervise(state, replace(GOOD, **seen), PARAMETERS)
+
+
+def test_nothing_moves_before_the_arm_has_told_where_it_is():
+    state = after(SafetyState(), status_time=None)
+    assert state.mode is Mode.WAITING
+    assert not state.may_move
+    assert after(state).may_move
+
+
+def test_nothing_moves_while_the_arm_is_not_ready_or_its_first_status_is_old():
+    assert not after(SafetyState(), robot_mode=1).may_move
+    assert not after(SafetyState(), status_time=9.0).may_move
+
+
+def test_all_is_well_goes_on():
+    assert after() == FOLLOWING
+
+
+LATCHED = [
+    ({"robot_mode": REFLEX}, Cause.REFLEX),
+    ({"robot_mode": USER_STOPPED}, Cause.USER_STOP),
+    ({"robot_mode": 1}, Cause.NOT_READY),
+    ({"tip_force": 15.1}, Cause.FORCE),
+    ({"held_back": True}, Cause.JOINT_LIMIT),
+    ({"p_WE": np.array([0.5, 0.0, -0.001])}, Cause.WORKSPACE),
+    ({"p_WE": np.array([0.5, 0.7, 0.1])}, Cause.WORKSPACE),
+    ({"lag": 0.11}, Cause.NOT_FOLLOWING),
+    ({"gap": 0.11}, Cause.GAP),
+]
+
+
+@pytest.mark.parametrize(("seen", "cause"), LATCHED)
+def test_a_stop_holds_until_the_operator_says_otherwise(seen, cause):
+    state = after(**seen)
+    assert state == SafetyState(Mode.STOPPED, cause)
+    for _ in range(10):
+        state = after(state)  # all is well again
+    assert state.mode is Mode.STOPPED
+    assert after(released(state)).may_move
+
+
+@pytest.mark.parametrize(("seen", "cause"), LATCHED[:3])
+def test_the_word_alone_does_not_move_an_arm_that_refuses(seen, cause):
+    assert not after(released(after(**seen)), **seen).may_move
+
+
+@pytest.mark.parametrize(
+    ("seen", "cause"),
+    [({"status_time": 9.89}, Cause.STATUS_OLD), ({"image_time": 9.49}, Cause.IMAGES_OLD)],
+)
+def test_old_news_is_a_pause_that_ends_when_news_has_been_fresh_for_a_while(seen, cause):
+    state = after(**seen)
+    assert state == SafetyState(Mode.PAUSED, cause)
+    for now in (10.1, 10.2):
+        state = after(state, now=now, status_time=now, image_time=now)
+        assert not state.may_move
+    assert after(state, now=10.41, status_time=10.41, image_time=10.41).may_move
+
+
+def test_news_that_is_fresh_only_now_and_then_does_not_end_a_pause():
+    state = after(status_time=9.0)
+    for tick in range(10):
+        now = 10 + 0.2 * tick
+        state = after(state, now=now, status_time=now, image_time=now)
+        state = after(state, now=now + 0.1, status_time=now - 1, image_time=now)
+        assert not state.may_move
+
+
+def test_pictures_may_be_old_while_no_motion_is_planned():
+    assert after(image_time=None, in_motion=False).may_move
+    assert not after(image_time=None).may_move
+
+
+def test_a_push_may_push_back_harder():
+    assert after(tip_force=29.0, contact_planned=True).may_move
+    assert after(tip_force=31.0, contact_planned=True).cause is Cause.FORCE
+
+
+def test_a_danger_in_a_pause_is_a_stop():
+    assert after(SafetyState(Mode.PAUSED, Cause.IMAGES_OLD), tip_force=50.0).mode is Mode.STOPPED
+
+
+def test_what_the_arm_says_is_the_cause_that_is_told():
+    stopped = SafetyState(Mode.STOPPED, Cause.FORCE)
+    assert after(stopped, robot_mode=REFLEX).cause is Cause.REFLEX
+
+
+def test_the_end_is_the_end():
+    state = ended(Cause.INTERRUPT)
+    assert after(state) == state
+    assert released(state) == state
