@@ -133,11 +133,12 @@ def settled_pair(
     """
     intrinsics = pair.current.intrinsics
     sigma_R, sigma_p = error.sigma(parameters.confidence)
+    depth = pair.reference.depth[::16, ::16]
+    z = float(np.median(depth[depth > 0])) if (depth > 0).any() else np.inf
+    if intrinsics.fx * np.hypot(sigma_R, sigma_p / z) < parameters.exact:
+        return pair
     p_C0Q, residual_sigma, on_table, uv_1 = _points(pair, optical_flow, above_0, noise, parameters.points)
     if len(p_C0Q) < 30:
-        return pair
-    z = float(np.median(p_C0Q[:, 2]))
-    if intrinsics.fx * np.hypot(sigma_R, sigma_p / z) < parameters.exact:
         return pair
     # The error of both poses enters, as it does between consecutive frames.
     change = table_change(pair.reference, above_0.plane_W, pair.current, above_1.plane_W)
