@@ -12,8 +12,6 @@ import numpy as np
 from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.geometry.se3 import log_se3
 
-_WIDTH = 640
-
 
 @dataclass
 class FramePairParameters:
@@ -22,8 +20,7 @@ class FramePairParameters:
     kind: str = field(default="motion", metadata={"choices": ("motion", "consecutive")})
     """"motion" or, as in the paper, "consecutive"."""
     flow_span: float = 20.0
-    """Effective flow, pixels of an image 640 wide, after which the reference is renewed; in other sizes as
-    much of the image: what flow can follow goes by its coarsest scale."""
+    """Effective flow, pixels, after which the reference is renewed."""
     moving: float = 0.5
     """Effective flow, pixels, from which something moves."""
     camera_span_moving: float = 0.08
@@ -53,7 +50,7 @@ def next_pair(
     if parameters.kind == "consecutive":
         return FramePair(pair.current, frame)
     if flow_span >= parameters.moving:
-        renew = flow_span > parameters.flow_span * frame.intrinsics.width / _WIDTH
+        renew = flow_span > parameters.flow_span
         share = parameters.camera_span_moving
     else:
         renew = frame.time - pair.reference.time > parameters.age_still

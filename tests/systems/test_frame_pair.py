@@ -73,7 +73,7 @@ class AboveOfFrame(LeafSystem):
         self.DeclareAbstractOutputPort(
             "above_table",
             lambda: AbstractValue.Make(object()),
-            lambda context, output: output.set_value(("above", number_in(frame.Eval(context)))),
+            lambda context, output: output.set_value(Above(("above", number_in(frame.Eval(context))))),
             {self.all_input_ports_ticket()},
         )
 
@@ -93,6 +93,12 @@ def silhouette(q: np.ndarray) -> np.ndarray:
 def number_in(frame) -> int | None:
     """The number written into the image."""
     return None if frame is None else int(frame.color[0, 0, 0])
+
+
+class Above(tuple):
+    """Stands in for what stands on the table, of which only the table is looked at here."""
+
+    plane_W = np.array([0.0, 0.0, 1.0, 0.0])
 
 
 class Loop:
