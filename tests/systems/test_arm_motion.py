@@ -235,3 +235,23 @@ def test_the_operator_can_end_it():
     read = run_permitted(Script([push_to(THERE)] * 9), 2.0, lambda _: Permission.END)
     assert read("phase") is ArmPhase.DONE
     assert read("interaction_step") == 0
+
+
+def test_an_arm_that_has_not_set_out_yet_is_not_taken_for_one_that_is_back():
+    late = [0.0]
+    builder = DiagramBuilder()
+    motion = builder.AddSystem(ArmMotion(Q_OBSERVE, None, None, lambda: late[0]))
+    eyes = builder.AddSystem(Eyes(Script([push_to(THERE), push_to(THERE, at=0.1)])))
+    for name in ("pair", "mask", "push"):
+        builder.Connect(eyes.GetOutputPort(name), motion.GetInputPort(name))
+    builder.Connect(motion.GetOutputPort("interaction_step"), eyes.GetInputPort("interaction_step"))
+    builder.Connect(motion.GetOutputPort("position"), motion.GetInputPort("position_measured"))
+    simulator = Simulator(builder.Build())
+    context = motion.GetMyContextFromRoot(simulator.get_context())
+    simulator.AdvanceTo(10.0)
+    assert motion.GetOutputPort("phase").Eval(context) is ArmPhase.OBSERVE
+    assert motion.GetOutputPort("interaction_step").Eval(context) == 1
+    assert motion.GetOutputPort("tried_pushes").Eval(context) == ()
+    late[0] = 20.0
+    simulator.AdvanceTo(16.0)
+    assert motion.GetOutputPort("interaction_step").Eval(context) == 2
