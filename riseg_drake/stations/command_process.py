@@ -42,7 +42,7 @@ REPORT_EVERY = 4
 """A report every so many periods."""
 PRIORITY = 20
 """Among real-time processes, where the system allows that."""
-MOST_PERIODS = 4
+MOST_PERIODS = 8
 """The trajectory makes up for this many periods at most; after a longer gap it is slower for a moment."""
 MOST_MESSAGES = 200
 """Read from the pipe in one period at most; the rest waits for the next."""
