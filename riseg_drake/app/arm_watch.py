@@ -42,7 +42,7 @@ class ArmWatch:
         if state.mode is Mode.STOPPED:
             self._ask(state.cause.value)
         elif state.mode is Mode.ENDED or report.refused:
-            self._progress.end = state.cause.value or report.refused
+            self._progress.end = report.refused or state.cause.value
         elif state.mode is not self._said and state.mode is Mode.PAUSED:
             self._operator.tell(f"paused: {state.cause.value}")
         self._said = state.mode

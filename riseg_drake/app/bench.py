@@ -39,6 +39,7 @@ def bench_command(scenario_file: Path | None, seed: int, stream: int | None, con
     With `stream` say instead how evenly commands come for so many seconds beside that.
     """
     scenario = load_scenario(scenario_file)
+    _ = scenario.simulated  # says so where it is not
     require_graphics()
     with console.status("rendering a push"):
         images = push_images(scenario, seed)

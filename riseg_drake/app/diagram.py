@@ -156,7 +156,9 @@ def make_diagram(
     builder.AddSystem(station)
     segmentation = add_segmentation(builder, scenario, kinematics, seed)
     planner = builder.AddSystem(PushPlanner(kinematics, scenario.push, seed))
-    arm = builder.AddSystem(ArmMotion(q_observe, scenario.arm, permit))
+    sink = drivers.sink if drivers else None
+    done_until = sink.done_until if sink else None
+    arm = builder.AddSystem(ArmMotion(q_observe, scenario.arm, permit, done_until))
 
     for name, port in STATION_PORTS.items():
         builder.Connect(station.GetOutputPort(port), segmentation.inputs[name])

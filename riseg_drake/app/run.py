@@ -36,6 +36,7 @@ def run_command(
 ) -> None:
     """Run one scene, tell how it goes, and show the scores of every interaction."""
     scenario = load_scenario(scenario_file)
+    _ = scenario.simulated  # says so where it is not
     require_graphics()
     name = scenario_name(scenario_file)
     folder = RunFolder(output or Path("out") / f"{name}_seed_{seed}", {"scenario": name, "seed": seed})

@@ -119,6 +119,11 @@ class CommandStream:
         return self._playout.remaining if self._playout.in_motion else 0.0
 
     @property
+    def done_until(self) -> float:
+        """Targets up to this time have been gone through, s; minus infinity before the first."""
+        return -np.inf if self._playout.time is None else self._playout.time
+
+    @property
     def at_rest(self) -> bool:
         """Whether commands stand still."""
         return self._limiter is None or self._limiter.at_rest

@@ -42,7 +42,7 @@ REPORT_EVERY = 4
 """A report every so many periods."""
 PRIORITY = 20
 """Among real-time processes, where the system allows that."""
-MOST_PERIODS = 4
+MOST_PERIODS = 8
 """The trajectory makes up for this many periods at most; after a longer gap it is slower for a moment."""
 MOST_MESSAGES = 200
 """Read from the pipe in one period at most; the rest waits for the next."""
@@ -62,6 +62,8 @@ class StreamReport:
     status: ArmStatus | None
     behind: float
     """How much motion is still to be played out, s."""
+    done_until: float
+    """Targets up to this time have been gone through, s; minus infinity before the first."""
     at_rest: bool
     refused: str = ""
     """Why targets were not taken, if they were not."""
@@ -119,6 +121,11 @@ class CommandProcess:
     def release(self) -> None:
         """The operator's word that a stopped arm may move again."""
         self._send("release")
+
+    def done_until(self) -> float:
+        """Up to what time, s, targets have been gone through; as of the newest report."""
+        report = self.report
+        return -np.inf if report is None else report.done_until
 
     @property
     def report(self) -> StreamReport | None:
@@ -221,14 +228,11 @@ def stream_commands(
             final = final + 1 if command is not None else FINAL_COMMANDS
         rounds += 1
         if rounds % REPORT_EVERY == 0:
-            _tell(
-                connection,
-                StreamReport(stream.state, stream.position, status, stream.behind, stream.at_rest, refused),
-            )
+            _tell(connection, _report(stream, status, refused))
         due = due + periods * period if periods < MOST_PERIODS else start + period
         time.sleep(max(due - time.monotonic(), 0.0))
     with suppress(OSError):
-        connection.send(StreamReport(stream.state, stream.position, news.read(), stream.behind, True, refused))
+        connection.send(_report(stream, news.read(), refused))
         connection.send(np.array(sent))
         connection.close()
 
@@ -255,6 +259,18 @@ def _obey(connection: Connection, stream: CommandStream) -> str:
     except (EOFError, OSError):
         stream.end(Cause.CLIENT_GONE)
     return refused
+
+
+def _report(stream: CommandStream, status: ArmStatus | None, refused: str) -> StreamReport:
+    return StreamReport(
+        state=stream.state,
+        position=stream.position,
+        status=status,
+        behind=stream.behind,
+        done_until=stream.done_until,
+        at_rest=stream.at_rest,
+        refused=refused,
+    )
 
 
 def _tell(connection: Connection, report: StreamReport) -> None:

@@ -100,6 +100,9 @@ class TargetSink(Protocol):
     def send_target(self, time: float, position: NDArray) -> None:
         """Joint angles [7], rad, to be at about the wall time `time`, s."""
 
+    def done_until(self) -> float:
+        """Up to what time, s, targets have been gone through: the arm may be late."""
+
 
 class HardwareStation(Diagram):
     """Behind its ports are the drivers. The context's time must be wall time.

@@ -57,6 +57,8 @@ class _Memory:
     proposed: Push | None = None
     """What it would do next, and has not been permitted yet."""
     start_time: float = 0.0
+    end_time: float = -np.inf
+    """When the last push was over, as far as commands go, s."""
     offset: NDArray[np.float64] = field(default_factory=lambda: np.zeros(7))
     """Of the commanded joint angles from the path at its start, rad."""
     rest_since: float | None = None
@@ -93,6 +95,8 @@ class ArmMotion(LeafSystem):
         tried_pushes: tuple of TriedPush.
 
     `permit` is asked about every push, again and again while it says WAIT; without it each is done.
+    `done_until` tells up to what time, s, the commanded positions have been gone through, where that may be
+    later than they are commanded: an arm that has not set out yet is also at rest where it should be.
 
     No output depends on an input at the same moment: `tried_pushes` and `position` may be wired back to
     the planner.
@@ -103,12 +107,14 @@ class ArmMotion(LeafSystem):
         q_observe: NDArray,
         parameters: ArmMotionParameters | None = None,
         permit: Callable[[Push], Permission] | None = None,
+        done_until: Callable[[], float] | None = None,
     ):
         super().__init__()
         self.set_name("ArmMotion")
         self._q_observe = np.array(q_observe, float)
         self._parameters = parameters or ArmMotionParameters()
         self._permit = permit
+        self._done_until = done_until
         anything = Value[object](None)
         self._push = self.DeclareAbstractInputPort("push", anything)
         self._pair = self.DeclareAbstractInputPort("pair", anything)
@@ -171,7 +177,8 @@ class ArmMotion(LeafSystem):
             return self._ask(memory, time)
 
         error = np.abs(self._measured.Eval(context) - self._q_observe).max()
-        if error > parameters.rest_tolerance:
+        done = self._done_until is None or self._done_until() >= memory.end_time
+        if error > parameters.rest_tolerance or not done:
             return memory if memory.rest_since is None else replace(memory, rest_since=None)
         if memory.rest_since is None:
             return replace(memory, rest_since=time)
@@ -226,7 +233,13 @@ class ArmMotion(LeafSystem):
         assert memory.push.path is not None
         if time < memory.start_time + memory.push.path.duration:
             return memory
-        return replace(memory, interaction_step=memory.interaction_step + 1, unjudged=memory.push, push=None)
+        return replace(
+            memory,
+            interaction_step=memory.interaction_step + 1,
+            unjudged=memory.push,
+            push=None,
+            end_time=time,
+        )
 
     def _judge(self, memory: _Memory, pair: FramePair, context: Context) -> _Memory:
         """Remember what the last push brought."""

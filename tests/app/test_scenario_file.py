@@ -77,3 +77,41 @@ def test_a_file_that_is_no_text_is_refused(tmp_path):
         read_scenario(tmp_path / "x.yaml", Scene)
     with pytest.raises(ScenarioError, match="not a readable text file"):
         read_scenario(tmp_path, Scene)
+
+
+@dataclass
+class Drawn:
+    seed: int = 0
+
+
+@dataclass
+class Real:
+    url: str = "here"
+    camera: Camera = field(default_factory=Camera)
+
+
+@dataclass
+class Either:
+    station: Drawn | Real = field(default_factory=Drawn)
+
+
+def test_a_tag_chooses_between_kinds_and_the_first_needs_none():
+    def either(text):
+        return parse_scenario(text, Either, source="either.yaml").station
+
+    assert either("station: {seed: 3}") == Drawn(seed=3)
+    assert either("station: !Real {camera: {rate: 5}}") == Real(camera=Camera(rate=5.0))
+    assert either("{}") == Drawn()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("station: !Reel {}", r"station must be one of !Drawn, !Real, not !Reel"),
+        ("station: !Real {camera: {rat: 5}}", r"unknown key 'station.camera.rat'; did you mean 'rate'"),
+        ("station: {url: there}", r"unknown key 'station.url'"),
+    ],
+)
+def test_a_kind_is_checked_as_what_it_is(text, message):
+    with pytest.raises(ScenarioError, match=message):
+        parse_scenario(text, Either, source="either.yaml")

@@ -278,7 +278,7 @@ def random_trial(seed):
     """Plans and disturbances at random; returns the runs of commands between silences."""
     rng = np.random.default_rng(seed)
     arm = Arm()
-    arm.parameters.playout.delay = rng.choice([0.05, 0.3])
+    arm.parameters.playout.delay = rng.choice([0.1, 0.3])
     start = np.clip(
         PANDA_LIMITS.position_middle + rng.uniform(-0.6, 0.6, 7),
         *(PANDA_LIMITS.position_lower + 0.1, PANDA_LIMITS.position_upper - 0.1),
@@ -295,15 +295,15 @@ def random_trial(seed):
         (t, path.value(min(t, path.end_time()))[:, 0] + (jump and t > 0.5) * rng.normal(scale=0.03, size=7))
         for t in np.arange(0, path.end_time() + 1, period)
     ]
-    origin, burst = arm.now, rng.choice([0.01, 0.1, 0.5])
+    origin, burst = arm.now, rng.choice([0.01, 0.05, 0.3])
     next_burst = origin
-    for _ in range(rng.integers(100, 400)):
+    for tick in range(rng.integers(150, 450)):
         if arm.now >= next_burst:
             while feed and origin + feed[0][0] <= arm.now:
                 t, q = feed.pop(0)
                 arm.stream.add_target(origin + t, q)
             next_burst = arm.now + burst * rng.uniform(0.5, 1.5)
-        chance = rng.random()
+        chance = rng.random() if tick > 60 else 1.0  # under way by then
         if chance < 0.005:
             arm.silent_status = not arm.silent_status
         elif chance < 0.01:
@@ -340,4 +340,4 @@ def test_random_plans_and_disturbances_never_lead_outside_the_limits(first):
             if PANDA_LIMITS.contains(run[0]):
                 assert (PANDA_LIMITS.room(run) >= 0).all(), seed
             motions += np.ptp(run, axis=0).max() > 0.01
-    assert motions > 1  # the test has seen motions
+    assert motions > 5  # the test has seen motions

@@ -103,3 +103,15 @@ def test_pusher_and_camera_are_as_heavy_as_stated(ours):
     plant, parts = ours
     masses = [plant.get_body(b).default_mass() for b in plant.GetBodyIndices(parts.pusher)]
     assert sorted(masses) == [0.075, 0.25]
+
+
+def test_a_calibrated_camera_is_where_the_calibration_says():
+    plant, parts = plant_of(PandaDescription(X_EC=[0.1, 0.02, -0.3, 0.1, 0.2, 1.5]))
+    X_EC = parts.camera_frame.CalcPose(plant.CreateDefaultContext(), parts.tip_frame)
+    np.testing.assert_allclose(X_EC.translation(), [0.1, 0.02, -0.3], atol=1e-12)
+    np.testing.assert_allclose(X_EC.rotation().ToRollPitchYaw().vector(), [0.1, 0.2, 1.5], atol=1e-12)
+
+
+def test_half_a_calibration_is_refused():
+    with pytest.raises(ValueError, match="expected 6"):
+        plant_of(PandaDescription(X_EC=[0.1, 0.0, 0.0]))

@@ -33,6 +33,9 @@ class Bench:
     def send_target(self, time, position):
         self.sent.append((time, np.array(position)))
 
+    def done_until(self):
+        return self.now
+
     def status(self, time, position):
         message = lcmt_panda_status()
         message.utime = round(time * 1e6)

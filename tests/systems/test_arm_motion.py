@@ -14,7 +14,7 @@ from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.pushing.push import ArmPhase, Push
 from riseg_drake.pushing.push_path import PushPath
 from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest
-from riseg_drake.systems.arm_motion import ArmMotion, ArmMotionParameters
+from riseg_drake.systems.arm_motion import ArmMotion, ArmMotionParameters, Permission
 
 Q_OBSERVE = np.array([0.0, -0.54, 0.0, -2.55, 0.0, 2.01, 0.0])
 CAMERA = Intrinsics(4, 4, 2.0, 2.0, 1.5, 1.5)
@@ -197,3 +197,61 @@ def test_arm_that_is_not_where_it_should_be_is_waited_for():
 def test_no_output_depends_on_an_input_at_the_same_moment():
     motion = ArmMotion(Q_OBSERVE)
     assert not motion.HasAnyDirectFeedthrough()
+
+
+def run_permitted(script, until, permit):
+    """Whether and when the arm moved, with a permit; interactions made, and pushes tried."""
+    builder = DiagramBuilder()
+    motion = builder.AddSystem(ArmMotion(Q_OBSERVE, None, permit))
+    eyes = builder.AddSystem(Eyes(script))
+    for name in ("pair", "mask", "push"):
+        builder.Connect(eyes.GetOutputPort(name), motion.GetInputPort(name))
+    builder.Connect(motion.GetOutputPort("interaction_step"), eyes.GetInputPort("interaction_step"))
+    builder.Connect(motion.GetOutputPort("position"), motion.GetInputPort("position_measured"))
+    simulator = Simulator(builder.Build())
+    simulator.AdvanceTo(until)
+    context = motion.GetMyContextFromRoot(simulator.get_context())
+    return lambda name: motion.GetOutputPort(name).Eval(context)
+
+
+def test_an_arm_that_is_not_permitted_to_push_stands_still_and_shows_what_it_would_do():
+    push = push_to(THERE)
+    read = run_permitted(Script([push]), 3.0, lambda _: Permission.WAIT)
+    assert read("phase") is ArmPhase.OBSERVE
+    assert read("active_push") is push
+    np.testing.assert_array_equal(read("position"), Q_OBSERVE)
+
+
+def test_a_push_that_is_skipped_counts_as_tried_in_vain():
+    answers = iter([Permission.SKIP, Permission.WAIT, Permission.DO])
+    script = Script([push_to(THERE)])
+    read = run_permitted(script, 10.0, lambda _: next(answers))
+    assert [push.changed for push in read("tried_pushes")] == [False, False]
+    assert read("interaction_step") == 1
+    assert len(script.asked) == 4  # once for each proposal, and null twice
+
+
+def test_the_operator_can_end_it():
+    read = run_permitted(Script([push_to(THERE)] * 9), 2.0, lambda _: Permission.END)
+    assert read("phase") is ArmPhase.DONE
+    assert read("interaction_step") == 0
+
+
+def test_an_arm_that_has_not_set_out_yet_is_not_taken_for_one_that_is_back():
+    late = [0.0]
+    builder = DiagramBuilder()
+    motion = builder.AddSystem(ArmMotion(Q_OBSERVE, None, None, lambda: late[0]))
+    eyes = builder.AddSystem(Eyes(Script([push_to(THERE), push_to(THERE, at=0.1)])))
+    for name in ("pair", "mask", "push"):
+        builder.Connect(eyes.GetOutputPort(name), motion.GetInputPort(name))
+    builder.Connect(motion.GetOutputPort("interaction_step"), eyes.GetInputPort("interaction_step"))
+    builder.Connect(motion.GetOutputPort("position"), motion.GetInputPort("position_measured"))
+    simulator = Simulator(builder.Build())
+    context = motion.GetMyContextFromRoot(simulator.get_context())
+    simulator.AdvanceTo(10.0)
+    assert motion.GetOutputPort("phase").Eval(context) is ArmPhase.OBSERVE
+    assert motion.GetOutputPort("interaction_step").Eval(context) == 1
+    assert motion.GetOutputPort("tried_pushes").Eval(context) == ()
+    late[0] = 20.0
+    simulator.AdvanceTo(16.0)
+    assert motion.GetOutputPort("interaction_step").Eval(context) == 2
