@@ -9,6 +9,7 @@ FLOORS = {
     "geometry": 0,
     "robot": 1,
     "segmentation": 2,
+    "learned": 2,
     "pushing": 2,
     "evaluation": 2,
     "recording": 2,

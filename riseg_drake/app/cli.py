@@ -94,6 +94,17 @@ def _parser() -> argparse.ArgumentParser:
         help="also record the runs, and segment them as the paper has it, one switch at a time",
     )
 
+    evaluate.add_argument(
+        "--baseline", choices=("sam",), help="also score Segment Anything, alone and with our masks as prompts"
+    )
+    evaluate.add_argument(
+        "--masks",
+        action="append",
+        default=[],
+        metavar="NAME=DIR",
+        help="also score another method's DIR/scene_000/step_1/mask.png ...; may be given again",
+    )
+
     score = _add(
         commands,
         "score",
@@ -114,6 +125,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_scenario(bench)
     bench.add_argument("--seed", type=int, default=0, metavar="N", help="draws the scene and the noise (0)")
+    bench.add_argument("--raft", action="store_true", help="measure RAFT instead, small and large")
 
     diagram = _add(
         commands,
@@ -173,6 +185,8 @@ def _evaluate(chosen: argparse.Namespace, console: Console) -> None:
         chosen.scenario,
         chosen.dask,
         chosen.ablation,
+        chosen.baseline,
+        chosen.masks,
         console,
     )
 
@@ -184,6 +198,10 @@ def _score(chosen: argparse.Namespace, console: Console) -> None:
 
 
 def _bench(chosen: argparse.Namespace, console: Console) -> None:
+    if chosen.raft:
+        from riseg_drake.app.raft_bench import raft_bench_command
+
+        return raft_bench_command(chosen.scenario, console)
     from riseg_drake.app.bench import bench_command
 
     bench_command(chosen.scenario, chosen.seed, console)
@@ -203,6 +221,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.app.scenario_file import ScenarioError
     from riseg_drake.app.scene_pool import ClusterError
     from riseg_drake.evaluation.label_folders import LabelFolderError
+    from riseg_drake.learned.model_error import ModelError
     from riseg_drake.recording.layout import RecordingError
     from riseg_drake.stations.scene import SceneError
 
@@ -215,4 +234,5 @@ def _mistakes() -> tuple[type[Exception], ...]:
         RecordingError,
         EvaluationError,
         ClusterError,
+        ModelError,
     )

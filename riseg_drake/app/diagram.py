@@ -15,6 +15,7 @@ from pydrake.systems.framework import (
 )
 
 from riseg_drake.app.meshcat_view import MeshcatView
+from riseg_drake.app.refinement_block import add_refinement
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.segmentation_block import STATION_PORTS, add_segmentation
@@ -24,6 +25,7 @@ from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.segmentation.segment import Segmentation
 from riseg_drake.stations.simulated import SimulatedStation, start_position
 from riseg_drake.systems.arm_motion import ArmMotion
+from riseg_drake.systems.mask_refiner import MaskRefiner, RefinedMask
 from riseg_drake.systems.push_planner import PushPlanner
 
 
@@ -32,11 +34,16 @@ class WiredDiagram:
 
     All ports of the station are exported under their own names, and the outputs of the stages: `pair`,
     `above_table`, `expected_flow`, `optical_flow`, `groups`, `mask`, `segmentation`, `push`, `phase`,
-    `interaction_step`, `active_push`.
+    `interaction_step`, `active_push`, and `refined` where the scenario names a SAM.
     """
 
     def __init__(
-        self, diagram: Diagram, station: SimulatedStation, stages: list[LeafSystem], scenario: Scenario
+        self,
+        diagram: Diagram,
+        station: SimulatedStation,
+        stages: list[LeafSystem],
+        scenario: Scenario,
+        refiner: MaskRefiner | None = None,
     ):
         self.diagram = diagram
         self.stages = stages
@@ -44,6 +51,7 @@ class WiredDiagram:
         self.most_interactions = scenario.arm.most_interactions
         self.object_names = {i: placed.name for i, placed in enumerate(station.objects, start=1)}
         """By object id, as in the ground truth."""
+        self._refiner = refiner
         self._object_bodies = station.object_bodies
         self._ports: dict[str, OutputPort] = {}
 
@@ -75,6 +83,16 @@ class WiredDiagram:
     def mask(self, context: Context) -> NDArray[np.uint16]:
         """L_t [H, W]."""
         return self.read("mask", context)
+
+    def refined(self, context: Context) -> RefinedMask | None:
+        """The newest mask with sharper outlines; None before the first, and where nothing refines."""
+        return None if self._refiner is None else self.read("refined", context)
+
+    def finish_refinement(self, context: Context) -> list[RefinedMask]:
+        """Wait for the outlines that are still being worked on; they come oldest first."""
+        if self._refiner is None:
+            return []
+        return self._refiner.finish(self._refiner.GetMyContextFromRoot(context))
 
     def phase(self, context: Context) -> ArmPhase:
         """What the arm is doing."""
@@ -133,6 +151,7 @@ def make_diagram(scenario: Scenario, seed: int, meshcat: Meshcat | None = None) 
     builder.Connect(planner.GetOutputPort("push"), arm.GetInputPort("push"))
     builder.Connect(station.GetOutputPort("panda.position_measured"), arm.GetInputPort("position_measured"))
     builder.Connect(arm.GetOutputPort("position"), station.GetInputPort("panda.position"))
+    refiner = add_refinement(builder, scenario, segmentation, arm)
     if meshcat is not None:
         view = builder.AddSystem(MeshcatView(meshcat, 1 / config.camera.rate))
         for name in ("pair", "segmentation"):
@@ -147,6 +166,8 @@ def make_diagram(scenario: Scenario, seed: int, meshcat: Meshcat | None = None) 
     builder.ExportOutput(planner.GetOutputPort("push"), "push")
     for name in ("phase", "interaction_step", "active_push"):
         builder.ExportOutput(arm.GetOutputPort(name), name)
+    if refiner is not None:
+        builder.ExportOutput(refiner.GetOutputPort("refined"), "refined")
     diagram = builder.Build()
     diagram.set_name("rt-RISeg")
-    return WiredDiagram(diagram, station, [*segmentation.stages, planner, arm], scenario)
+    return WiredDiagram(diagram, station, [*segmentation.stages, planner, arm], scenario, refiner)

@@ -4,12 +4,13 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 
+from riseg_drake.app.flow_method import OpticalFlowParameters
 from riseg_drake.app.scenario_file import parse_scenario, read_scenario
+from riseg_drake.learned.sam import SamParameters
 from riseg_drake.pushing.push_planning import PushPlanningParameters
 from riseg_drake.segmentation.above_table import AboveTableParameters
 from riseg_drake.segmentation.bfif import BFIFParameters
 from riseg_drake.segmentation.frame_pairs import FramePairParameters
-from riseg_drake.segmentation.optical_flow import DisFlowParameters
 from riseg_drake.segmentation.segment import SegmentParameters
 from riseg_drake.stations.simulated import SimulatedStationConfig
 from riseg_drake.systems.arm_motion import ArmMotionParameters
@@ -27,12 +28,14 @@ class Scenario:
     """What counts as standing on the table (Alg. 3, line 1)."""
     frame_pair: FramePairParameters = field(default_factory=FramePairParameters)
     """Which two frames are compared."""
-    optical_flow: DisFlowParameters = field(default_factory=DisFlowParameters)
+    optical_flow: OpticalFlowParameters = field(default_factory=OpticalFlowParameters)
     """Alg. 2, line 2."""
     bfif: BFIFParameters = field(default_factory=BFIFParameters)
     """Alg. 2, lines 3 to 6."""
     segment: SegmentParameters = field(default_factory=SegmentParameters)
     """Alg. 2, line 7."""
+    sam: SamParameters = field(default_factory=SamParameters)
+    """Sharper outlines after each interaction, where a folder with a model is given."""
     push: PushPlanningParameters = field(default_factory=PushPlanningParameters)
     """Alg. 3, and the arm's path for a push."""
     arm: ArmMotionParameters = field(default_factory=ArmMotionParameters)

@@ -1,6 +1,6 @@
 """Trains a small RAFT on drawn rigid motion and says how it does on pairs that it never saw.
 
-    python -m riseg_drake.app.train_raft raft_small_drawn.pth
+python -m riseg_drake.app.train_raft raft_small_drawn.pth
 """
 
 import argparse
@@ -18,7 +18,7 @@ from rich.table import Table
 from riseg_drake.learned.model_error import ModelError, require
 from riseg_drake.learned.raft_flow import RaftFlow
 from riseg_drake.learned.rigid_motion_pairs import PairParameters, draw_pair
-from riseg_drake.segmentation.optical_flow import DisFlow
+from riseg_drake.segmentation.optical_flow import DisFlow, FlowMethod
 
 UNSEEN_PAIRS = 100
 _LIKE_TRAINING = PairParameters()
@@ -81,7 +81,7 @@ def report(raft: RaftFlow, seed: int, console: Console) -> dict[str, dict[str, t
     for kind, (count, parameters) in UNSEEN.items():
         rng = np.random.default_rng([seed, 1])  # training has [seed, 0]
         pairs = [draw_pair(rng, parameters) for _ in range(count)]
-        methods = {"RAFT": raft, "DIS": DisFlow(), "zero flow": no_flow}
+        methods: dict[str, FlowMethod] = {"RAFT": raft, "DIS": DisFlow(), "zero flow": no_flow}
         errors[kind] = {name: end_point_errors(method, pairs) for name, method in methods.items()}
         for name, (everywhere, on_bodies) in errors[kind].items():
             table.add_row(f"{count} {kind}", name, f"{everywhere:.2f}", f"{on_bodies:.2f}")

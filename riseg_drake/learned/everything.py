@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.learned.prompts import PromptedSegmenter, grid_prompts
+from riseg_drake.learned.prompts import PromptedSegmenter, grid_prompts, intersection_over_union
 
 
 @dataclass
@@ -42,7 +42,7 @@ def segment_everything(
         parameters: see there.
     """
     found: list[tuple[float, NDArray[np.bool_]]] = []
-    for answer in segmenter(color, grid_prompts(*above_table.shape, parameters.grid_side)):
+    for answer in segmenter(color, grid_prompts(*color.shape[:2], side=parameters.grid_side)):
         good = (answer.scores >= parameters.score_min) & (answer.stability >= parameters.stability_min)
         for mask, score in zip(answer.masks[good], answer.scores[good], strict=True):
             area = np.count_nonzero(mask)
@@ -50,14 +50,10 @@ def segment_everything(
                 found.append((float(score), mask))
     kept: list[NDArray[np.bool_]] = []
     for _, mask in sorted(found, key=lambda each: -each[0]):
-        if all(_iou(mask, other) <= parameters.same_iou for other in kept):
+        if all(intersection_over_union(mask, other) <= parameters.same_iou for other in kept):
             kept.append(mask)
     label = np.zeros(above_table.shape, np.uint16)
     # The smaller over the larger: a part that was found by itself stays visible.
     for number, mask in enumerate(sorted(kept, key=np.count_nonzero, reverse=True), start=1):
         label[mask] = number
     return label
-
-
-def _iou(a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float:
-    return np.count_nonzero(a & b) / max(np.count_nonzero(a | b), 1)

@@ -13,9 +13,7 @@ def require(module: str, extra: str) -> ModuleType:
     try:
         return import_module(module)
     except ImportError as error:
-        raise ModelError(
-            f"{module} cannot be imported ({error}); pip install 'riseg-drake[{extra}]'"
-        ) from None
+        raise ModelError(f"{module} cannot be imported ({error}); pip install 'riseg-drake[{extra}]'") from None
 
 
 def torch_device(name: str) -> str:

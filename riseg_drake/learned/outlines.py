@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.rgbd import Frame
-from riseg_drake.learned.prompts import Answer, PromptedSegmenter, prompt_of_mask
+from riseg_drake.learned.prompts import Answer, PromptedSegmenter, intersection_over_union, prompt_of_mask
 
 
 @dataclass
@@ -64,27 +64,23 @@ def refine_outlines(
     refined = _settle(claims, frame.depth, parameters.depth_step)
     for a in ids:
         # Others have claimed it away. Its own pixels were nobody else's before: no other is worse off.
-        if _iou(refined == a, mask == a) < parameters.iou_min:
+        if intersection_over_union(refined == a, mask == a) < parameters.iou_min:
             refined[refined == a] = 0
             refined[mask == a] = a
     return refined
 
 
-def _claim(
-    prompt: NDArray[np.bool_], answer: Answer, robot: NDArray[np.bool_], iou_min: float
-) -> _Claim:
+def _claim(prompt: NDArray[np.bool_], answer: Answer, robot: NDArray[np.bool_], iou_min: float) -> _Claim:
     """Of a model's answers the one that agrees best with the prompt; if none does, the prompt itself."""
     masks = answer.masks & ~robot
-    agreement = np.array([_iou(each, prompt) for each in masks])
+    agreement = np.array([intersection_over_union(each, prompt) for each in masks])
     best = int(agreement.argmax())
     if agreement[best] < iou_min:
         return _Claim(prompt, score=0.0)
     return _Claim(masks[best], float(answer.scores[best]))
 
 
-def _settle(
-    claims: Mapping[int, _Claim], depth: NDArray[np.float32], depth_step: float
-) -> NDArray[np.uint16]:
+def _settle(claims: Mapping[int, _Claim], depth: NDArray[np.float32], depth_step: float) -> NDArray[np.uint16]:
     """One label image [H, W] of claims that may overlap."""
     claimed = np.sum([claim.mask for claim in claims.values()], axis=0)
     contested = claimed > 1
@@ -121,8 +117,3 @@ def _misfit(
     depth_of[nearest[own]] = depth[own]
     misfit = np.where(depth > 0, np.abs(depth - depth_of[nearest]), 0.0)
     return np.where(claim, misfit, np.inf)
-
-
-def _iou(a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float:
-    """Intersection over union; 0 for two empty masks."""
-    return np.count_nonzero(a & b) / max(np.count_nonzero(a | b), 1)

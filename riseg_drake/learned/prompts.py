@@ -72,3 +72,8 @@ def grid_prompts(height: int, width: int, side: int) -> list[Prompt]:
     u = (np.arange(side) + 0.5) * width / side - 0.5
     v = (np.arange(side) + 0.5) * height / side - 0.5
     return [Prompt(np.array([[x, y]])) for y in v for x in u]
+
+
+def intersection_over_union(a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float:
+    """How well two masks [H, W] agree, in [0, 1]; 0 for two empty ones."""
+    return int(np.count_nonzero(a & b)) / max(int(np.count_nonzero(a | b)), 1)

@@ -73,10 +73,12 @@ class Raft(nn.Module):
             iterations: corrections of the flow.
         """
         both = self.features(torch.cat([image_0, image_1]))
-        correlation = Correlation(*both.float().chunk(2), self.size.lookup_radius)
+        features_0, features_1 = both.float().chunk(2)
+        correlation = Correlation(features_0, features_1, self.size.lookup_radius)
         hidden, context = self.context(image_0).split([self.size.hidden, self.size.context], dim=1)
         hidden, context = torch.tanh(hidden), torch.relu(context)
-        start = _pixels(image_0.shape[0], *hidden.shape[-2:], device=image_0.device)
+        n, _, h, w = hidden.shape
+        start = _pixels(n, h, w, image_0.device)
         target, flows = start, []
         for iteration in range(iterations):
             target = target.detach()

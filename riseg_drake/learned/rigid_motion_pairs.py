@@ -61,7 +61,7 @@ def draw_pair(rng: np.random.Generator, parameters: PairParameters) -> FlowPair:
     )
     bodies = [_Body(rng, X_WC0, parameters) for _ in range(rng.integers(1, parameters.bodies_max + 1))]
     paint_table = _Paint(rng, blank_share=0.5)
-    light_W = rng.normal(size=3) + [0, 0, 3]
+    light_W = rng.normal([0.0, 0.0, 3.0], 1.0)
     light_W /= np.linalg.norm(light_W)
 
     def look(X_WC: NDArray, poses: list[NDArray]) -> tuple[NDArray, NDArray, NDArray]:
@@ -160,7 +160,11 @@ def _see(
         enter, normal_B = body.enter((X_WC[:3, 3] - X_WB[:3, 3]) @ R_WB, ray_W @ R_WB)
         nearer = enter < depth
         depth[nearer], number[nearer], normal_W[nearer] = enter[nearer], k, (normal_B @ R_WB.T)[nearer]
-    return depth.reshape(intrinsics.shape), number.reshape(intrinsics.shape), normal_W.reshape(*intrinsics.shape, 3)
+    return (
+        depth.reshape(intrinsics.shape),
+        number.reshape(intrinsics.shape),
+        normal_W.reshape(*intrinsics.shape, 3),
+    )
 
 
 def _intrinsics(rng: np.random.Generator, parameters: PairParameters) -> Intrinsics:

@@ -21,7 +21,8 @@ from riseg_drake.learned.prompts import Answer, Prompt
 
 MODELS = {"sam": "SamModel", "sam2": "Sam2Model", "sam2_video": "Sam2Model"}
 """The class for each `model_type` in a folder's config.json; SAM 2's images and videos share their weights."""
-_MEAN, _DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
+_MEAN = np.array((0.485, 0.456, 0.406), np.float32)
+_DEVIATION = np.array((0.229, 0.224, 0.225), np.float32)
 """Of the colours of the images that both were trained on (ImageNet's)."""
 _MASK_LOGIT = 10.0
 """How sure a mask prompt is, as the models would say it themselves."""
@@ -114,7 +115,7 @@ class SamSegmenter:
         """The image as the models want it, [1, 3, side, side]; the padding is 0 after normalisation."""
         import torch
 
-        normal = (color.astype(np.float32) / 255 - np.float32(_MEAN)) / np.float32(_DEVIATION)
+        normal = (color.astype(np.float32) / 255 - _MEAN) / _DEVIATION
         shrinks = max(scaling.scaled) < max(scaling.size)
         square = scaling.to_square(normal, cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
         return torch.from_numpy(square).permute(2, 0, 1)[None].contiguous().to(self._device)
@@ -162,7 +163,9 @@ def load_sam(folder: Path, device: str = "auto") -> SamSegmenter:
     try:
         kind = json.loads((folder / "config.json").read_text(encoding="utf-8"))["model_type"]
     except (OSError, ValueError, KeyError, TypeError):
-        raise ModelError(f"{folder} holds no config.json that names a model_type, as transformers saves it") from None
+        raise ModelError(
+            f"{folder} holds no config.json that names a model_type, as transformers saves it"
+        ) from None
     if kind not in MODELS:
         raise ModelError(f"{folder} holds a model of type {kind!r}; this project knows {', '.join(MODELS)}")
     require("torch", extra="sam")

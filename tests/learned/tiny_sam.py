@@ -32,7 +32,9 @@ def tiny_sam() -> Any:
     )
     prompting = SamPromptEncoderConfig(hidden_size=32, image_size=SIDE, patch_size=PATCH, mask_input_channels=8)
     decoder = SamMaskDecoderConfig(hidden_size=32, mlp_dim=64, num_attention_heads=2, iou_head_hidden_dim=32)
-    return SamModel(SamConfig(vision_config=vision, prompt_encoder_config=prompting, mask_decoder_config=decoder))
+    return SamModel(
+        SamConfig(vision_config=vision, prompt_encoder_config=prompting, mask_decoder_config=decoder)
+    )
 
 
 def tiny_sam2() -> Any:
@@ -63,7 +65,9 @@ def tiny_sam2() -> Any:
         backbone_feature_sizes=[[32, 32], [16, 16], [8, 8]],
         fpn_hidden_size=32,
     )
-    prompting = Sam2PromptEncoderConfig(hidden_size=32, image_size=SIDE, patch_size=PATCH, mask_input_channels=8)
+    prompting = Sam2PromptEncoderConfig(
+        hidden_size=32, image_size=SIDE, patch_size=PATCH, mask_input_channels=8
+    )
     decoder = Sam2MaskDecoderConfig(hidden_size=32, mlp_dim=64, num_attention_heads=2, iou_head_hidden_dim=32)
     return Sam2Model(
         Sam2Config(vision_config=vision, prompt_encoder_config=prompting, mask_decoder_config=decoder)
