@@ -42,7 +42,8 @@ def segment_everything(
         parameters: see there.
     """
     found: list[tuple[float, NDArray[np.bool_]]] = []
-    for answer in segmenter(color, grid_prompts(*color.shape[:2], side=parameters.grid_side)):
+    height, width = above_table.shape
+    for answer in segmenter(color, grid_prompts(height, width, parameters.grid_side)):
         good = (answer.scores >= parameters.score_min) & (answer.stability >= parameters.stability_min)
         for mask, score in zip(answer.masks[good], answer.scores[good], strict=True):
             area = np.count_nonzero(mask)

@@ -194,6 +194,9 @@ class _Encoder(nn.Module):
             )
         )
         self.last = nn.Conv2d(widths[-1], channels, 1)
+        for module in self.modules():
+            if isinstance(module, nn.Conv2d):  # else the signal fades on its way, and learning takes far longer
+                nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
 
     def forward(self, image: Tensor) -> Tensor:
         return self.last(self.stages(self.stem(image)))

@@ -21,12 +21,12 @@ from riseg_drake.learned.rigid_motion_pairs import FlowPair, PairParameters, dra
 
 @dataclass
 class TrainingParameters:
-    """Twenty minutes on one core."""
+    """A quarter of an hour on one core."""
 
-    steps: int = 1500
+    steps: int = 1300
     batch: int = 4
     """Pairs in a step."""
-    iterations: int = 6
+    iterations: int = 5
     """Corrections of the flow in training (paper: 12)."""
     learning_rate: float = 5e-4
     """At its highest (paper: 4e-4 with batches of 10)."""

@@ -18,7 +18,7 @@ from riseg_drake.geometry.se3 import inverse, move_points
 class PairParameters:
     """What is drawn; lengths in m, the camera's as for the wrist camera at half its resolution."""
 
-    width: int = 160
+    width: int = 128
     """Pixels, a multiple of 8."""
     height: int = 128
     """Pixels, a multiple of 8."""

@@ -171,6 +171,7 @@ def load_sam(folder: Path, device: str = "auto") -> SamSegmenter:
     require("torch", extra="sam")
     transformers = require("transformers", extra="sam")
     try:
+        transformers.utils.logging.disable_progress_bar()
         model_class = getattr(transformers, MODELS[kind])
         model, loading = model_class.from_pretrained(folder, local_files_only=True, output_loading_info=True)
     except Exception as error:  # whatever transformers and safetensors have to say

@@ -1,14 +1,15 @@
-"""torchvision's RAFT as an independent reference."""
+"""torchvision's RAFT as an independent reference, where torchvision is installed."""
 
+from importlib.util import find_spec
 from types import ModuleType
 
 import pytest
 
+if find_spec("torch") and find_spec("torchvision"):
+    # Beside a CPU build of torch its compiled operators are not there; RAFT uses none. Imported before anyone
+    # else does: transformers imports torchvision where it is installed, and would stumble over them.
+    import torch
 
-@pytest.fixture(scope="session")
-def reference() -> ModuleType:
-    """torchvision's `optical_flow`; its compiled operators, which RAFT does not use, may be missing."""
-    torch = pytest.importorskip("torch")
     register = torch.library.register_fake
 
     def register_what_is_there(op, *arguments, **options):
@@ -17,7 +18,15 @@ def reference() -> ModuleType:
         return register(op, *arguments, **options)
 
     torch.library.register_fake = register_what_is_there
-    try:
-        return pytest.importorskip("torchvision.models.optical_flow")
-    finally:
-        torch.library.register_fake = register
+    import torchvision.models.optical_flow  # noqa: F401
+
+    torch.library.register_fake = register
+
+
+@pytest.fixture(scope="session")
+def reference() -> ModuleType:
+    """torchvision's `optical_flow`."""
+    return pytest.importorskip(
+        "torchvision.models.optical_flow",
+        reason="the reference needs torchvision (pip install --no-deps torchvision==0.28.0)",
+    )
