@@ -69,6 +69,10 @@ def tiny_sam2() -> Any:
         hidden_size=32, image_size=SIDE, patch_size=PATCH, mask_input_channels=8
     )
     decoder = Sam2MaskDecoderConfig(hidden_size=32, mlp_dim=64, num_attention_heads=2, iou_head_hidden_dim=32)
-    return Sam2Model(
+    model = Sam2Model(
         Sam2Config(vision_config=vision, prompt_encoder_config=prompting, mask_decoder_config=decoder)
     )
+    # Public weights have one code of places for prompts and patches; drawn at random there would be two.
+    for_patches, for_prompts = model.shared_image_embedding, model.prompt_encoder.shared_embedding
+    for_prompts.load_state_dict(for_patches.state_dict())
+    return model
