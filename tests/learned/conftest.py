@@ -5,11 +5,15 @@ from types import ModuleType
 
 import pytest
 
+if find_spec("torch"):
+    import torch
+
+    # The tests are too small for more, and threads wait long for each other where something else runs, too.
+    torch.set_num_threads(1)
+
 if find_spec("torch") and find_spec("torchvision"):
     # Beside a CPU build of torch its compiled operators are not there; RAFT uses none. Imported before anyone
     # else does: transformers imports torchvision where it is installed, and would stumble over them.
-    import torch
-
     register = torch.library.register_fake
 
     def register_what_is_there(op, *arguments, **options):
