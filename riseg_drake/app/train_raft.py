@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("output", type=Path, metavar="FILE", help="the checkpoint to write")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="draws weights and pairs (0)")
-    parser.add_argument("--steps", type=int, metavar="N", help="of training (1300)")
+    parser.add_argument("--steps", type=int, metavar="N", help="of training (4000)")
     parser.add_argument("--threads", type=int, default=1, metavar="N", help="for torch (1)")
     chosen = parser.parse_args(arguments)
     console = Console()
@@ -53,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     def tell(step: int, error: float) -> None:
         recent.append(error)
-        if step % 50 == 0 or step == parameters.steps:
+        if step % 100 == 0 or step == parameters.steps:
             console.print(
                 f"step {step} of {parameters.steps}: end-point error {np.mean(recent):.2f} px, "
                 f"{perf_counter() - start:.0f} s"

@@ -5,6 +5,7 @@ princeton-vl (the authors; often with `module.` before every name) and torchvisi
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 
 import torch
@@ -50,13 +51,12 @@ def network_of(tensors: Mapping[str, Tensor], source: str) -> Raft:
     given = {short: tensors[name] for short, name in names.items()}
     # The size and the spelling that fit best: a partial checkpoint is then told what it lacks.
     candidates = [
-        (Raft(size), spelling, title)
+        (size, spelling, title)
         for title, size in SIZES.items()
         for spelling in (princeton_names, torchvision_names)
     ]
-    network, spelling, title = max(candidates, key=lambda c: _fitting(c[0], c[1](c[0].size), given))
-    own = network.state_dict()
-    expected = spelling(network.size)
+    size, spelling, title = max(candidates, key=lambda c: _fitting(c[0], c[1](c[0]), given))
+    own, expected = _own_shapes(size), spelling(size)
     missing = sorted(set(expected) - set(given))
     unknown = sorted(set(given) - set(expected))
     if len(missing) == len(expected):
@@ -65,12 +65,13 @@ def network_of(tensors: Mapping[str, Tensor], source: str) -> Raft:
         wrong = [f"lacks {_list(missing)}"] * bool(missing) + [f"has also {_list(unknown)}"] * bool(unknown)
         raise ModelError(f"{source} is not {title}: it {' and '.join(wrong)}")
     shapes = [
-        f"{name} {list(given[name].shape)}, not {list(own[key].shape)}"
+        f"{name} {list(given[name].shape)}, not {list(own[key])}"
         for name, key in expected.items()
-        if given[name].shape != own[key].shape
+        if given[name].shape != own[key]
     ]
     if shapes:
         raise ModelError(f"{source} is not {title}: it has {_list(shapes)}")
+    network = Raft(size)
     network.load_state_dict({key: given[name] for name, key in expected.items()})
     return network
 
@@ -78,24 +79,24 @@ def network_of(tensors: Mapping[str, Tensor], source: str) -> Raft:
 def princeton_names(size: RaftSize) -> dict[str, str]:
     """What the authors call each tensor -> what it is called here. Some have two names there."""
     # The large network has two recurrent units, and numbers them.
-    names = {_princeton(key, numbered=size.is_large): key for key in _own_names(size)}
-    # A block's last normalisation is also known as part of its shortcut.
-    number = 3 if size.is_large else 4
+    names = {_princeton(key, numbered=size.is_large): key for key in _own_shapes(size)}
+    # The normalisation of a shortcut is also known as the third of its block; the small network has none.
     twice = {
-        name.replace("downsample.1", f"norm{number}"): key
-        for name, key in names.items()
-        if "downsample.1" in name
+        name.replace("downsample.1", "norm3"): key for name, key in names.items() if "downsample.1" in name
     }
     return {**names, **twice}
 
 
 def torchvision_names(size: RaftSize) -> dict[str, str]:
     """What torchvision calls each tensor -> what it is called here."""
-    return {_torchvision(key): key for key in _own_names(size)}
+    return {_torchvision(key): key for key in _own_shapes(size)}
 
 
-def _own_names(size: RaftSize) -> list[str]:
-    return list(Raft(size).state_dict())
+@cache
+def _own_shapes(size: RaftSize) -> dict[str, torch.Size]:
+    """What each tensor is called here, and its shape."""
+    with torch.device("meta"):  # nothing is allocated
+        return {key: tensor.shape for key, tensor in Raft(size).state_dict().items()}
 
 
 def _princeton(key: str, numbered: bool) -> str:
@@ -165,10 +166,10 @@ def _renamed(key: str, rules: Sequence[_Rule]) -> str:
     return key
 
 
-def _fitting(network: Raft, names: Mapping[str, str], given: Mapping[str, Tensor]) -> int:
-    """How many of the given tensors have a name and a shape that this network knows."""
-    own = network.state_dict()
-    return sum(name in given and given[name].shape == own[key].shape for name, key in names.items())
+def _fitting(size: RaftSize, names: Mapping[str, str], given: Mapping[str, Tensor]) -> int:
+    """How many of the given tensors have a name and a shape that a network of this size knows."""
+    own = _own_shapes(size)
+    return sum(name in given and given[name].shape == own[key] for name, key in names.items())
 
 
 def _list(names: Sequence[str]) -> str:

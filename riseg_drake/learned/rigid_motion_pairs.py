@@ -1,7 +1,7 @@
 """Image pairs of bodies that move rigidly over a table, drawn, with the flow that they have: to learn from.
 
-Boxes and ellipsoids with patterns, stripes or one colour are met by each pixel's ray, so flow is exact. The
-table is as often blank as not: where nothing can be seen to move, the network must learn from what is around.
+Boxes and ellipsoids with waves, patches or one colour are met by each pixel's ray, so flow is exact. Some of
+them, and some tables, are blank: where nothing can be seen to move, the network must learn from what is around.
 """
 
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class PairParameters:
     """m; largest displacement of a body on the table ..."""
     body_turn: float = 0.25
     """... and its largest turn, rad; one body in three stands still."""
-    camera_motion: float = 0.008
+    camera_motion: float = 0.006
     """m; standard deviation of the camera's displacement along each axis ..."""
     camera_turn: float = 0.01
     """... and of its turn about each, rad."""
@@ -60,7 +60,7 @@ def draw_pair(rng: np.random.Generator, parameters: PairParameters) -> FlowPair:
         rng.normal(0, parameters.camera_turn, 3), rng.normal(0, parameters.camera_motion, 3)
     )
     bodies = [_Body(rng, X_WC0, parameters) for _ in range(rng.integers(1, parameters.bodies_max + 1))]
-    paint_table = _Paint(rng, blank_share=0.5)
+    paint_table = _Paint(rng, blank_share=0.25)
     light_W = rng.normal([0.0, 0.0, 3.0], 1.0)
     light_W /= np.linalg.norm(light_W)
 
@@ -93,7 +93,7 @@ class _Paint:
     def __init__(self, rng: np.random.Generator, blank_share: float) -> None:
         self._base = rng.uniform(40, 255, 3)
         self._other = rng.uniform(0, 255, 3)
-        self._kind = "blank" if rng.random() < blank_share else rng.choice(["waves", "stripes"])
+        self._kind = "blank" if rng.random() < blank_share else rng.choice(["waves", "patches"])
         if self._kind == "blank" and rng.random() < 0.7:
             self._base = np.full(3, rng.uniform(180, 250))  # as a table often is
         lengths = np.exp(rng.uniform(np.log(0.006), np.log(0.05), 8))
@@ -106,8 +106,7 @@ class _Paint:
         """[..., 3] of points [..., 3]."""
         if self._kind == "blank":
             return np.broadcast_to(self._base, p_BQ.shape).copy()
-        count = 8 if self._kind == "waves" else 2
-        height = np.sin(p_BQ @ self._waves[:count].T + self._phases[:count]).sum(-1) / np.sqrt(count)
+        height = np.sin(p_BQ @ self._waves.T + self._phases).sum(-1) / np.sqrt(len(self._phases))
         share = np.clip(0.5 + (0.4 if self._kind == "waves" else 4.0) * height, 0, 1)[..., None]
         return self._base + share * (self._other - self._base)
 
@@ -118,7 +117,7 @@ class _Body:
     def __init__(self, rng: np.random.Generator, X_WC: NDArray, parameters: PairParameters) -> None:
         self.half_size = rng.uniform([0.012, 0.012, 0.008], [0.05, 0.05, 0.03])
         self.is_box = rng.random() < 0.6
-        self.paint = _Paint(rng, blank_share=0.25)
+        self.paint = _Paint(rng, blank_share=0.15)
         span = 0.7 * X_WC[2, 3] * parameters.width / parameters.focal_length
         x, y = X_WC[:2, 3] + rng.uniform(-span, span, 2) / 2
         self.X_WB0 = _motion([0, 0, rng.uniform(-np.pi, np.pi)], [x, y, self.half_size[2]])
