@@ -1,7 +1,7 @@
 """MaskRefiner: the outlines of L*_t made sharper by a slow model, which no frame waits for."""
 
 import os
-import threading
+import sys
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ Refinement = Callable[[Frame, NDArray[np.uint16]], NDArray[np.uint16]]
 own, one call after the other."""
 
 _NICENESS = 10
-"""The worker's, on Linux: while frames have work to do, the processor is theirs."""
+"""By how much the worker is nicer, on Linux: while frames have work to do, the processor is theirs."""
 
 _NO_DEMAND = object()
 
@@ -135,5 +135,5 @@ class MaskRefiner(LeafSystem):
 
 def _stand_back() -> None:
     """Let other threads go first: on Linux each thread, and those that it starts, has its own niceness."""
-    if hasattr(os, "setpriority"):
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
+    if sys.platform == "linux":  # elsewhere the whole process has one niceness
+        os.nice(_NICENESS)

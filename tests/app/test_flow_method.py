@@ -1,5 +1,6 @@
 """The scenario chooses the flow."""
 
+import numpy as np
 import pytest
 
 from riseg_drake.app.flow_method import OpticalFlowParameters, flow_method
@@ -34,3 +35,17 @@ def test_a_file_that_is_not_there_is_named():
 def test_another_kind_is_refused_with_the_choices():
     with pytest.raises(ScenarioError, match=r"optical_flow\.kind must be one of dis, raft, not 'flownet'"):
         chosen("optical_flow: {kind: flownet}")
+
+
+def test_the_weights_of_a_scenario_give_its_flow(tmp_path):
+    torch = pytest.importorskip("torch", reason="RAFT needs torch (pip install 'riseg-drake[raft]')")
+    from riseg_drake.learned.raft import RAFT_SMALL, Raft
+    from riseg_drake.learned.raft_training import save
+
+    torch.manual_seed(0)
+    save(Raft(RAFT_SMALL), tmp_path / "raft.pth")
+    raft = f"{{checkpoint: {tmp_path / 'raft.pth'}, iterations: 1, device: cpu}}"
+    flow = flow_method(chosen(f"optical_flow: {{kind: raft, raft: {raft}}}"))(
+        *np.zeros((2, 96, 128, 3), np.uint8)
+    )
+    assert flow.shape == (96, 128, 2)

@@ -1,5 +1,7 @@
 """MaskRefiner: no frame waits for the model, and each interaction's mask is refined once."""
 
+import os
+import sys
 import threading
 
 import numpy as np
@@ -144,6 +146,22 @@ def test_at_the_end_the_last_mask_at_rest_is_not_forgotten(drawn_frames, model):
     alone.tick(3, ArmPhase.OBSERVE)
     (refined,) = alone.finish()
     assert refined.time == drawn_frames[3].time
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux gives each thread its own niceness")
+def test_the_worker_stands_back_and_the_frames_do_not(drawn_frames):
+    nicenesses = []
+
+    def note(frame, mask):
+        nicenesses.append(os.getpriority(os.PRIO_PROCESS, threading.get_native_id()))
+        return mask
+
+    before = os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
+    alone = Alone(note, drawn_frames)
+    alone.tick(0, ArmPhase.OBSERVE)
+    alone.finish()
+    assert nicenesses[0] > before or before == 19
+    assert os.getpriority(os.PRIO_PROCESS, threading.get_native_id()) == before
 
 
 def test_without_a_frame_nothing_happens(model):
