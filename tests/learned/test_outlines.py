@@ -57,6 +57,20 @@ def test_ids_stay_with_their_objects(seen, found):
         np.testing.assert_array_equal(refined == object_id, labels == number)
 
 
+def test_nonsense_about_one_object_costs_no_other_its_outline(seen, found):
+    frame, labels = seen
+    perfect = Perfect(labels)
+
+    def wrong_about_seven(color, prompts):
+        for prompt, true in zip(prompts, perfect(color, prompts), strict=True):
+            u, v = prompt.points[0].astype(int)
+            yield answer(np.ones(labels.shape, bool)) if found[v, u] == 7 else true
+
+    refined = refine_outlines(frame, found, wrong_about_seven, PARAMETERS)
+    np.testing.assert_array_equal(refined == 9, labels == 3)
+    assert (refined == 7).sum() > 0.9 * (found == 7).sum()
+
+
 def test_an_empty_mask_asks_nothing(seen):
     frame, labels = seen
 
