@@ -18,6 +18,7 @@ from pydrake.systems.framework import (
 )
 
 from riseg_drake.app.meshcat_view import MeshcatView
+from riseg_drake.app.refinement_block import add_refinement
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.segmentation_block import STATION_PORTS, add_segmentation
@@ -29,6 +30,7 @@ from riseg_drake.stations.hardware import HardwareStation, TargetSink
 from riseg_drake.stations.lcm_reception import Reception
 from riseg_drake.stations.simulated import SimulatedStation, SimulatedStationConfig, start_position
 from riseg_drake.systems.arm_motion import ArmMotion, Permission
+from riseg_drake.systems.mask_refiner import MaskRefiner, RefinedMask
 from riseg_drake.systems.push_planner import PushPlanner
 
 
@@ -47,7 +49,7 @@ class WiredDiagram:
 
     All ports of the station are exported under their own names, and the outputs of the stages: `pair`,
     `above_table`, `expected_flow`, `optical_flow`, `groups`, `mask`, `segmentation`, `push`, `phase`,
-    `interaction_step`, `active_push`.
+    `interaction_step`, `active_push`, and `refined` where the scenario names a SAM.
     """
 
     def __init__(
@@ -56,6 +58,7 @@ class WiredDiagram:
         station: SimulatedStation | HardwareStation,
         stages: list[LeafSystem],
         scenario: Scenario,
+        refiner: MaskRefiner | None = None,
     ):
         self.diagram = diagram
         self.stages = stages
@@ -65,6 +68,7 @@ class WiredDiagram:
         objects = station.objects if simulated else []
         self.object_names = {i: placed.name for i, placed in enumerate(objects, start=1)}
         """By object id, as in the ground truth; empty where nobody knows it."""
+        self._refiner = refiner
         self._object_bodies = station.object_bodies if simulated else {}
         self._ports: dict[str, OutputPort] = {}
 
@@ -96,6 +100,16 @@ class WiredDiagram:
     def mask(self, context: Context) -> NDArray[np.uint16]:
         """L_t [H, W]."""
         return self.read("mask", context)
+
+    def refined(self, context: Context) -> RefinedMask | None:
+        """The newest mask with sharper outlines; None before the first, and where nothing refines."""
+        return None if self._refiner is None else self.read("refined", context)
+
+    def finish_refinement(self, context: Context) -> list[RefinedMask]:
+        """Wait for the outlines that are still being worked on; they come oldest first."""
+        if self._refiner is None:
+            return []
+        return self._refiner.finish(self._refiner.GetMyContextFromRoot(context))
 
     def phase(self, context: Context) -> ArmPhase:
         """What the arm is doing."""
@@ -173,6 +187,7 @@ def make_diagram(
     builder.Connect(planner.GetOutputPort("push"), arm.GetInputPort("push"))
     builder.Connect(station.GetOutputPort("panda.position_measured"), arm.GetInputPort("position_measured"))
     builder.Connect(arm.GetOutputPort("position"), station.GetInputPort("panda.position"))
+    refiner = add_refinement(builder, scenario, segmentation, arm)
     if meshcat is not None:
         view = builder.AddSystem(MeshcatView(meshcat, 1 / config.camera.rate))
         for name in ("pair", "segmentation"):
@@ -187,6 +202,8 @@ def make_diagram(
     builder.ExportOutput(planner.GetOutputPort("push"), "push")
     for name in ("phase", "interaction_step", "active_push"):
         builder.ExportOutput(arm.GetOutputPort(name), name)
+    if refiner is not None:
+        builder.ExportOutput(refiner.GetOutputPort("refined"), "refined")
     diagram = builder.Build()
     diagram.set_name("rt-RISeg")
-    return WiredDiagram(diagram, station, [*segmentation.stages, planner, arm], scenario)
+    return WiredDiagram(diagram, station, [*segmentation.stages, planner, arm], scenario, refiner)

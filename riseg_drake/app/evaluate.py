@@ -12,6 +12,7 @@ from pydrake.common.yaml import yaml_dump_typed
 from rich.console import Console
 
 from riseg_drake.app.evaluation_progress import EvaluationProgress
+from riseg_drake.app.given_masks import parse_given_masks, with_given_masks
 from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.output import SUMMARY, OutputError, to_json
 from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
@@ -21,8 +22,9 @@ from riseg_drake.app.tables import score_table
 from riseg_drake.evaluation.disturbance import disturbance_of_all, disturbance_of_steps
 from riseg_drake.evaluation.figure import draw_figure
 from riseg_drake.evaluation.report import FIGURE_FILE, report_text
-from riseg_drake.evaluation.scene_result import SceneResult, scores_by_method, scores_by_switch
+from riseg_drake.evaluation.scene_result import OURS, SceneResult, scores_by_method, scores_by_switch
 from riseg_drake.evaluation.step_means import step_deviations, step_means
+from riseg_drake.learned.sam import load_sam
 from riseg_drake.recording.whole_file import write_text
 from riseg_drake.stations.object_models import find_models
 
@@ -42,6 +44,8 @@ def evaluate_command(
     scenario_file: Path | None,
     dask: str | None,
     ablation: bool,
+    baseline: str | None,
+    masks: Sequence[str],
     console: Console,
 ) -> None:
     """Run what is missing of an evaluation, then write its report."""
@@ -50,15 +54,24 @@ def evaluate_command(
         scenario.simulated.scene.objects = str(objects.resolve())
     find_models(scenario.simulated.scene.objects, scenario.simulated.scene.names)  # says it if there are none
     name = scenario_name(scenario_file)
+    if baseline == "sam":
+        _require_sam(scenario)
     tasks = scene_tasks(
-        scenario, name, output or Path("out") / f"evaluate_{name}_seed_{seed}", scenes, seed, ablation
+        scenario,
+        name,
+        output or Path("out") / f"evaluate_{name}_seed_{seed}",
+        scenes,
+        seed,
+        ablation,
+        sam=baseline == "sam",
     )
+    given = parse_given_masks(masks, taken=(OURS, *tasks[0].baselines))
     folder = tasks[0].folder.parent
     if dask is None:
         require_graphics()
     pool = local_pool(jobs) if dask is None else cluster_pool(dask)
     last_step = scenario.arm.most_interactions
-    results = evaluate(tasks, pool, last_step, console)
+    results = evaluate(tasks, pool, last_step, console, given)
     _print_scores(results, last_step, console)
     console.print(f"report in {folder / REPORT}")
     failures = [result.failure for result in results if result.failure]
@@ -67,17 +80,30 @@ def evaluate_command(
 
 
 def scene_tasks(
-    scenario: Scenario, name: str, folder: Path, scenes: int, seed: int, ablation: bool = False
+    scenario: Scenario,
+    name: str,
+    folder: Path,
+    scenes: int,
+    seed: int,
+    ablation: bool = False,
+    sam: bool = False,
 ) -> list[SceneTask]:
     """The scenes of an evaluation: scene k has the seed `seed + k` and the folder `scene_kkk`."""
     text = yaml_dump_typed(scenario, schema=Scenario)
-    return [SceneTask(folder / f"scene_{k:03d}", seed + k, name, text, ablation) for k in range(scenes)]
+    return [SceneTask(folder / f"scene_{k:03d}", seed + k, name, text, ablation, sam) for k in range(scenes)]
 
 
-def evaluate(tasks: Sequence[SceneTask], pool: Pool, last_step: int, console: Console) -> list[SceneResult]:
+def evaluate(
+    tasks: Sequence[SceneTask],
+    pool: Pool,
+    last_step: int,
+    console: Console,
+    given: Mapping[str, Path] | None = None,
+) -> list[SceneResult]:
     """Work on the scenes that are not finished yet, and write the report on all of them.
 
-    Raises OutputError if the folder belongs to something else; KeyboardInterrupt says how far it came.
+    `given` are folders with masks of other methods, by name. Raises OutputError if the folder belongs to
+    something else, LabelFolderError for masks that are missing; KeyboardInterrupt says how far it came.
     """
     folder = tasks[0].folder.parent
     about = _claim(folder, tasks)
@@ -92,10 +118,18 @@ def evaluate(tasks: Sequence[SceneTask], pool: Pool, last_step: int, console: Co
             failures[outcome.task.folder] = outcome.failure
             progress.tell(read_result(outcome.task, outcome.failure), outcome.seconds)
     results = [read_result(task, failures.get(task.folder, "")) for task in tasks]
+    results = with_given_masks(results, tasks, given or {})
     write_text(folder / REPORT, report_text(results, _about_text(about, tasks), last_step))
     draw_figure(results, last_step, folder / FIGURE_FILE)
     write_text(folder / SUMMARY, to_json({**about, "state": "done", **_figures(results, last_step)}))
     return results
+
+
+def _require_sam(scenario: Scenario) -> None:
+    """Say before the first scene what would fail in each of them."""
+    if not scenario.sam.folder:
+        raise EvaluationError("--baseline sam needs a model: name its folder in a scenario, sam: {folder: ...}")
+    load_sam(Path(scenario.sam.folder), scenario.sam.device)
 
 
 def _claim(folder: Path, tasks: Sequence[SceneTask]) -> dict[str, Any]:

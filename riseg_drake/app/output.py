@@ -1,7 +1,7 @@
 """The folder a run leaves behind: pictures and masks of every step, and a summary of them all.
 
     summary.json
-    step_0/ color.png  depth.png  mask.png  overlay.png  ground_truth.png
+    step_0/ color.png  depth.png  mask.png  overlay.png  ground_truth.png  (with a SAM: refined.png)
     step_1/ ...
 
 Whenever the run is stopped, every step that the summary lists is there, and whole.
@@ -54,6 +54,9 @@ class Step:
     ground_truth: NDArray[np.uint16] | None = None
     """[H, W], visible pixels of each object; only in simulation."""
     scores: Scores | None = None
+    refined_mask: NDArray[np.uint16] | None = None
+    """L*_t with sharper outlines [H, W], ids as in `mask`; only where a SAM is at work."""
+    refined_scores: Scores | None = None
     disturbance: Disturbance | None = None
     """What the interaction did to the objects; only in simulation, and not in step 0."""
 
@@ -98,6 +101,15 @@ class RunFolder:
             write_png(unfinished / "ground_truth.png", step.ground_truth.astype(np.uint16))
         unfinished.rename(self.path / name)
         self._summary["steps"].append(_step_to_json(step))
+        self._write_summary()
+
+    def write_refined(self, step: Step) -> None:
+        """Add the mask with sharper outlines to a step that was written before."""
+        assert step.refined_mask is not None
+        folder = self.path / f"step_{step.interaction_step}"
+        write_png(folder / "refined.png", step.refined_mask.astype(np.uint16))
+        (entry,) = (e for e in self._summary["steps"] if e["step"] == step.interaction_step)
+        entry.update(_step_to_json(step))
         self._write_summary()
 
     def note(self, **entries: Any) -> None:
@@ -150,6 +162,8 @@ def _step_to_json(step: Step) -> dict[str, Any]:
     }
     if step.scores is not None:
         content["scores"] = step.scores.as_dict()
+    if step.refined_scores is not None:
+        content["refined_scores"] = step.refined_scores.as_dict()
     if step.disturbance is not None:
         content["pushed"] = step.disturbance.pushed
         content["motions"] = {name: asdict(motion) for name, motion in step.disturbance.motions.items()}

@@ -2,8 +2,9 @@
 
 import resource
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
@@ -19,10 +20,12 @@ from riseg_drake.app.interactions import Listener, Progress, TruthSource, intera
 from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step, stage_figures, to_json
 from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
 from riseg_drake.app.tables import score_table, stage_table
+from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.recording.layout import RUN_FILE, SCENARIO_FILE, RecordedFrame
 from riseg_drake.recording.whole_file import write_text
 from riseg_drake.recording.writer import RecordingWriter
+from riseg_drake.systems.mask_refiner import RefinedMask
 from riseg_drake.systems.stage_clock import StageClock
 
 
@@ -63,7 +66,8 @@ def run(
         stack.enter_context(state_of(folder, progress, steps))
         wired = make_diagram(scenario, seed, meshcat)
         folder.note(objects={str(object_id): name for object_id, name in wired.object_names.items()})
-        listeners: list[Listener] = [lambda *_: narrator.follow(progress)]
+        refined = RefinedSteps(wired, folder, steps)
+        listeners: list[Listener] = [lambda *_: narrator.follow(progress), refined.look]
         if record:
             writer = stack.enter_context(RecordingWriter(folder.path / RECORDING, wired.intrinsics))
             write_text(writer.folder / SCENARIO_FILE, yaml_dump_typed(scenario))
@@ -75,6 +79,8 @@ def run(
             folder.write_step(step)
             steps.append(step)
             narrator.tell_step(step)
+        if progress.end:
+            refined.finish()
     narrator.tell_end(progress)
     return steps
 
@@ -167,6 +173,37 @@ def recorder(wired: WiredDiagram, writer: RecordingWriter, truth: TruthSource | 
     return record
 
 
+class RefinedSteps:
+    """Adds sharper outlines to the steps that they belong to, whenever they come."""
+
+    def __init__(self, wired: WiredDiagram, folder: RunFolder, steps: list[Step]):
+        self._wired, self._folder, self._steps = wired, folder, steps
+        self._last: RefinedMask | None = None
+        self._context: Context | None = None
+
+    def look(self, _: Frame, context: Context) -> None:
+        """A listener: see whether the worker is done with something."""
+        self._context = context
+        refined = self._wired.refined(context)
+        if refined is not None and refined is not self._last:
+            self._last = refined
+            self._add([refined])
+
+    def finish(self) -> None:
+        """Wait for the rest."""
+        if self._context is not None:
+            self._add([m for m in self._wired.finish_refinement(self._context) if m is not self._last])
+
+    def _add(self, refined: Iterable[RefinedMask]) -> None:
+        for each in refined:
+            for k, step in enumerate(self._steps):
+                if step.time == each.time:
+                    truth = step.ground_truth
+                    scores = None if truth is None else score(each.mask, truth)
+                    self._steps[k] = replace(step, refined_mask=each.mask, refined_scores=scores)
+                    self._folder.write_refined(self._steps[k])
+
+
 @contextmanager
 def _replay(meshcat: Meshcat, file: Path) -> Iterator[None]:
     """Keep what Meshcat shows, and save it as one HTML file."""
@@ -182,6 +219,11 @@ def _replay(meshcat: Meshcat, file: Path) -> Iterator[None]:
 def report(steps: list[Step], console: Console) -> None:
     """Print the scores of every step, where there are any, and the times of the stages."""
     rows = [(str(step.interaction_step), step.scores) for step in steps if step.scores is not None]
+    rows += [
+        (f"{step.interaction_step} with SAM", step.refined_scores)
+        for step in steps
+        if step.refined_scores is not None
+    ]
     if rows:
         console.print("\nscores in percent, after each interaction")
         console.print(score_table(rows, first="\nstep"))

@@ -4,13 +4,14 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 
+from riseg_drake.app.flow_method import OpticalFlowParameters
 from riseg_drake.app.scenario_file import ScenarioError, parse_scenario, read_scenario
+from riseg_drake.learned.sam import SamParameters
 from riseg_drake.pushing.push_planning import PushPlanningParameters
 from riseg_drake.segmentation.above_table import AboveTableParameters
 from riseg_drake.segmentation.bfif import BFIFParameters
 from riseg_drake.segmentation.camera_motion import CameraMotionParameters
 from riseg_drake.segmentation.frame_pairs import FramePairParameters
-from riseg_drake.segmentation.optical_flow import DisFlowParameters
 from riseg_drake.segmentation.segment import SegmentParameters
 from riseg_drake.stations.emulated_drivers import EmulatorConfig
 from riseg_drake.stations.hardware import HardwareStationConfig
@@ -33,12 +34,14 @@ class Scenario:
     """Which two frames are compared."""
     camera_motion: CameraMotionParameters = field(default_factory=CameraMotionParameters)
     """How far the camera's poses are believed."""
-    optical_flow: DisFlowParameters = field(default_factory=DisFlowParameters)
+    optical_flow: OpticalFlowParameters = field(default_factory=OpticalFlowParameters)
     """Alg. 2, line 2."""
     bfif: BFIFParameters = field(default_factory=BFIFParameters)
     """Alg. 2, lines 3 to 6."""
     segment: SegmentParameters = field(default_factory=SegmentParameters)
     """Alg. 2, line 7."""
+    sam: SamParameters = field(default_factory=SamParameters)
+    """Sharper outlines after each interaction, where a folder with a model is given."""
     push: PushPlanningParameters = field(default_factory=PushPlanningParameters)
     """Alg. 3, and the arm's path for a push."""
     arm: ArmMotionParameters = field(default_factory=ArmMotionParameters)

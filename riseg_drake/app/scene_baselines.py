@@ -21,19 +21,19 @@ from riseg_drake.stations.simulated import start_position
 def score_baselines(scenario: Scenario, run: Path, steps: int) -> dict[str, list[Scores]]:
     """The scores of every baseline on the images of `run/step_0` ... `run/step_{steps - 1}`."""
     scores: dict[str, list[Scores]] = {name: [] for name in BASELINES}
-    views = _ObservationView(scenario)
+    views = ObservationView(scenario)
     for i in range(steps):
         folder = run / f"step_{i}"
         frame = views.read(folder)
-        above_table = _above_table(frame, scenario)
+        standing = above_table(frame, scenario)
         ground_truth = read_labels(folder / "ground_truth.png")
         for name, segment in BASELINES.items():
-            labels = segment(frame.color, frame.depth, above_table, frame.intrinsics, BaselineParameters())
+            labels = segment(frame.color, frame.depth, standing, frame.intrinsics, BaselineParameters())
             scores[name].append(score(labels, ground_truth))
     return scores
 
 
-class _ObservationView:
+class ObservationView:
     """Turns the images of a step into the frame that they were: all are taken from one posture."""
 
     def __init__(self, scenario: Scenario):
@@ -44,12 +44,14 @@ class _ObservationView:
         self._robot = RobotSilhouette(kinematics, self._intrinsics).mask(q)
 
     def read(self, step: Path) -> Frame:
+        """The frame whose colour and depth are in the folder of a step."""
         color = cv2.cvtColor(cv2.imread(str(step / "color.png"), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
         depth = read_labels(step / "depth.png") / MILLIMETRES
         return Frame(0, 0.0, self._intrinsics, color, sanitize_depth(depth), self._X_WC, self._robot)
 
 
-def _above_table(frame: Frame, scenario: Scenario) -> NDArray[np.bool_]:
+def above_table(frame: Frame, scenario: Scenario) -> NDArray[np.bool_]:
+    """objMask [H, W] of a frame."""
     try:
         return objects_above_table(frame, scenario.above_table).mask
     except ValueError:  # no table to be seen: then nothing is known to stand on it

@@ -17,7 +17,7 @@ from riseg_drake.app.ablation import versions
 from riseg_drake.app.output import RECORDING, SUMMARY, to_json
 from riseg_drake.evaluation.baselines import BASELINES
 from riseg_drake.evaluation.disturbance import Disturbance, ObjectMotion
-from riseg_drake.evaluation.scene_result import SceneResult
+from riseg_drake.evaluation.scene_result import SAM_METHODS, SceneResult
 from riseg_drake.evaluation.scores import Scores
 from riseg_drake.recording.layout import COLOR_LIST
 from riseg_drake.recording.whole_file import write_text
@@ -36,8 +36,15 @@ class SceneTask:
     scenario: str
     """The whole scenario as YAML."""
     ablation: bool = False
+    sam: bool = False
+    """Whether Segment Anything is among the baselines."""
     threads: int = 1
     """How many the drawing of images may use; numbers are always crunched in one."""
+
+    @property
+    def baselines(self) -> tuple[str, ...]:
+        """The methods that must have their scores, by name."""
+        return (*BASELINES, *(SAM_METHODS if self.sam else ()))
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -56,7 +63,7 @@ def digest(scenario: str) -> str:
 
 def is_finished(task: SceneTask) -> bool:
     """Whether nothing is left to do for a scene."""
-    if not _run_is_finished(task) or set(read_json(task.folder / BASELINE_FILE)) != set(BASELINES):
+    if not _run_is_finished(task) or missing_baselines(task):
         return False
     return not task.ablation or ablation_is_finished(task)
 
@@ -67,6 +74,11 @@ def run_is_usable(task: SceneTask) -> bool:
         return False
     recorded = (task.folder / RECORDING / COLOR_LIST).exists()
     return not task.ablation or recorded or ablation_is_finished(task)
+
+
+def missing_baselines(task: SceneTask) -> set[str]:
+    """The methods that have no scores yet."""
+    return set(task.baselines) - set(read_json(task.folder / BASELINE_FILE))
 
 
 def ablation_is_finished(task: SceneTask) -> bool:
@@ -92,6 +104,7 @@ def read_result(task: SceneTask, failure: str = "") -> SceneResult:
     end = str(summary.get("end", "it did not begin"))
     ablation = read_json(task.folder / ABLATION_FILE) if task.ablation else {}
     steps = summary.get("steps", [])
+    baselines = _scores_from_json(read_json(task.folder / BASELINE_FILE))
     return SceneResult(
         name=task.folder.name,
         seed=task.seed,
@@ -99,7 +112,7 @@ def read_result(task: SceneTask, failure: str = "") -> SceneResult:
         end=end,
         scores=[Scores.from_dict(step["scores"]) for step in steps],
         disturbances=[_disturbance(step) for step in steps[1:]],
-        baselines=_scores_from_json(read_json(task.folder / BASELINE_FILE)),
+        baselines={name: baselines[name] for name in task.baselines if name in baselines},
         ablation=_scores_from_json(ablation.get("scores", {})),
         ablation_failures=ablation.get("failures", {}),
     )

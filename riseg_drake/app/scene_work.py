@@ -3,7 +3,7 @@
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import cv2
@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from riseg_drake.app.ablation import ablate
 from riseg_drake.app.output import RECORDING, SUMMARY, RunFolder, to_json
 from riseg_drake.app.run import run
+from riseg_drake.app.sam_baseline import score_sam
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.scenario_file import parse_scenario
 from riseg_drake.app.scene_baselines import score_baselines
@@ -20,11 +21,14 @@ from riseg_drake.app.scene_folder import (
     BASELINE_FILE,
     SceneTask,
     ablation_is_finished,
+    missing_baselines,
     read_json,
     run_is_usable,
 )
 from riseg_drake.evaluation.baselines import BASELINES
+from riseg_drake.evaluation.scene_result import SAM_METHODS
 from riseg_drake.evaluation.scores import Scores
+from riseg_drake.learned.sam import SamParameters
 from riseg_drake.recording.whole_file import write_text
 
 
@@ -76,15 +80,20 @@ def limited_threads(threads: int) -> Iterator[None]:
 def _run(task: SceneTask, scenario: Scenario) -> None:
     for name in (BASELINE_FILE, ABLATION_FILE):
         (task.folder / name).unlink(missing_ok=True)
+    # Outlines are refined afterwards, from what the run left: it is the same with and without a model.
+    scenario = replace(scenario, sam=SamParameters())
     run(scenario, task.seed, RunFolder(task.folder, task.settings), record=task.ablation)
 
 
 def _score_others(task: SceneTask, scenario: Scenario) -> None:
     """The scores of the baselines and, if asked for, of the other versions, for the steps there are."""
     steps = read_json(task.folder / SUMMARY).get("steps", [])
-    if set(read_json(task.folder / BASELINE_FILE)) != set(BASELINES):
-        baselines = score_baselines(scenario, task.folder, len(steps))
-        write_text(task.folder / BASELINE_FILE, to_json(_scores_to_json(baselines)))
+    missing = missing_baselines(task)
+    for methods, score_methods in ((BASELINES, score_baselines), (SAM_METHODS, score_sam)):
+        if missing & set(methods):
+            scores = _scores_to_json(score_methods(scenario, task.folder, len(steps)))
+            earlier = read_json(task.folder / BASELINE_FILE)
+            write_text(task.folder / BASELINE_FILE, to_json({**earlier, **scores}))
     if task.ablation and steps and not ablation_is_finished(task):
         times = [step["time_s"] for step in steps]
         ablation = ablate(scenario, task.seed, task.folder / RECORDING, times)

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, LeafSystem, OutputPort
 
+from riseg_drake.app.flow_method import flow_method
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.robot.silhouette import RobotSilhouette
-from riseg_drake.segmentation.optical_flow import DisFlow
 from riseg_drake.systems.bfif_grouper import BFIFGrouper
 from riseg_drake.systems.camera_motion import CameraMotion
 from riseg_drake.systems.expected_flow import ExpectedFlow
@@ -68,7 +68,7 @@ def add_stages(
         FramePairMemory(period, FRAME_OFFSET, scenario.frame_pair, scenario.camera_motion)
     )
     expected = builder.AddSystem(ExpectedFlow())
-    optical = builder.AddSystem(OpticalFlow(DisFlow(scenario.optical_flow)))
+    optical = builder.AddSystem(OpticalFlow(flow_method(scenario.optical_flow)))
     motion = builder.AddSystem(CameraMotion(scenario.camera_motion, scenario.bfif.noise))
     grouper = builder.AddSystem(BFIFGrouper(scenario.bfif, seed))
     propagator = builder.AddSystem(MaskPropagator(view.intrinsics, period, MASK_OFFSET, scenario.segment))

@@ -12,7 +12,7 @@ from riseg_drake.evaluation.scene_result import OURS, SceneResult, scores_by_met
 from riseg_drake.evaluation.step_means import carried, step_deviations, step_means
 
 _OURS_COLOR = "#d55e00"
-_BASELINE_COLORS = ("#0072b2", "#56b4e9", "#009e73")
+_BASELINE_COLORS = ("#0072b2", "#56b4e9", "#009e73", "#cc79a7", "#f0a000", "#8a5a2b")
 _PAPER_STYLES = (("-", "#222222"), ("--", "#555555"), ("-.", "#777777"), (":", "#777777"))
 
 

@@ -8,6 +8,10 @@ from riseg_drake.evaluation.scores import Scores
 
 OURS = "riseg_drake"
 """What this project's own masks are called in tables and figures."""
+SAM = "SAM"
+OURS_WITH_SAM = f"{OURS} + SAM"
+SAM_METHODS = (SAM, OURS_WITH_SAM)
+"""Segment Anything alone, and prompted by our masks, as in the paper."""
 
 
 @dataclass(frozen=True)

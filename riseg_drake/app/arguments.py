@@ -1,0 +1,267 @@
+"""What can be asked of `riseg` on the command line."""
+
+import argparse
+from pathlib import Path
+from typing import NoReturn
+
+from riseg_drake.app import commands
+
+BAD_INPUT = 2
+"""Exit code."""
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+
+def command_line() -> argparse.ArgumentParser:
+    """The parser of all commands; what it returns has the chosen command's function as `call`."""
+    parser = _Parser(
+        prog="riseg", description="Find the objects on a table by nudging them (rt-RISeg in Drake)."
+    )
+    subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    run = _add(
+        subparsers,
+        "run",
+        commands.run,
+        "Nudge the objects of one simulated scene until each is found, and score the masks.\n"
+        "Writes pictures, masks and scores of every interaction to the output folder.",
+    )
+    _add_scenario(run)
+    run.add_argument("--seed", type=int, default=0, metavar="N", help="draws the scene and the noise (0)")
+    run.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/SCENARIO_seed_N)")
+    run.add_argument("--record", action="store_true", help="also write every frame to DIR/recording")
+    run.add_argument(
+        "--meshcat",
+        action=argparse.BooleanOptionalAction,
+        default=False,
+        help="show it in the browser and save the replay as DIR/replay.html (no)",
+    )
+
+    evaluate = _add(
+        subparsers,
+        "evaluate",
+        commands.evaluate,
+        "Run many scenes, and put their scores into the paper's table and figure.\n"
+        "An evaluation that was stopped goes on where it was when the same command is given again.",
+    )
+    evaluate.add_argument("--scenes", type=_positive, default=20, metavar="N", help="how many (20)")
+    evaluate.add_argument(
+        "--seed",
+        type=int,
+        default=100,
+        metavar="S",
+        help="of the first scene, the others follow (100; the program was developed on 0 to 19)",
+    )
+    evaluate.add_argument("--objects", type=Path, metavar="DIR", help="draw from these SDF or URDF models")
+    evaluate.add_argument("--jobs", type=_positive, default=1, metavar="J", help="scenes at a time (1)")
+    evaluate.add_argument(
+        "--output", type=Path, metavar="DIR", help="output folder (out/evaluate_SCENARIO_seed_S)"
+    )
+    evaluate.add_argument("--scenario", type=Path, metavar="FILE", help="a YAML file (the built-in simulation)")
+    evaluate.add_argument("--dask", metavar="ADDRESS", help="hand the scenes to a running Dask cluster")
+    evaluate.add_argument(
+        "--ablation",
+        action="store_true",
+        help="also record the runs, and segment them as the paper has it, one switch at a time",
+    )
+
+    evaluate.add_argument(
+        "--baseline", choices=("sam",), help="also score Segment Anything, alone and with our masks as prompts"
+    )
+    evaluate.add_argument(
+        "--masks",
+        action="append",
+        default=[],
+        metavar="NAME=DIR",
+        help="also score another method's DIR/scene_000/step_1/mask.png ...; may be given again",
+    )
+
+    hardware = _add(
+        subparsers,
+        "hardware",
+        commands.hardware,
+        "The same on a real Panda with a RealSense camera, over their drivers on LCM; see docs/hardware.md.\n"
+        "The operator confirms every push; --dry-run shows pushes and moves nothing.",
+    )
+    hardware.add_argument(
+        "scenario", type=Path, nargs="?", metavar="SCENARIO", help="a YAML file (the built-in hardware.yaml)"
+    )
+    hardware.add_argument("--seed", type=int, default=0, metavar="N", help="draws samples (0)")
+    hardware.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/SCENARIO_TIME)")
+    hardware.add_argument("--record", action="store_true", help="also write every frame to DIR/recording")
+    hardware.add_argument(
+        "--meshcat", action=argparse.BooleanOptionalAction, default=False, help="show it in the browser (no)"
+    )
+    hardware.add_argument(
+        "--dry-run", action="store_true", help="show every planned push in the browser, and move nothing"
+    )
+    hardware.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
+    hardware.add_argument(
+        "--truth", action="store_true", help="score the masks by the ground truth of `riseg emulate`"
+    )
+    hardware.add_argument(
+        "--replayed",
+        action="store_true",
+        help="hear a log that lcm-logplayer plays: old time stamps count as new, nothing is moved",
+    )
+
+    hand_eye = _add(
+        subparsers,
+        "hand-eye",
+        commands.hand_eye,
+        "Move a real arm a little over a scene that stands still, and compare expected with observed flow.\n"
+        "Says in pixels how well the camera's pose on the arm is known, and where the table is.",
+    )
+    hand_eye.add_argument(
+        "scenario", type=Path, nargs="?", metavar="SCENARIO", help="a YAML file (the built-in hardware.yaml)"
+    )
+    hand_eye.add_argument("--output", type=Path, metavar="DIR", help="folder for pictures (out/hand_eye)")
+    hand_eye.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
+
+    emulate = _add(
+        subparsers,
+        "emulate",
+        commands.emulate,
+        "Stand in for the drivers of a Panda and a RealSense camera on LCM, around a simulated scene.\n"
+        "Runs at wall-clock time until Ctrl-C, and misbehaves when it is told to.",
+    )
+    _add_scenario(emulate)
+    emulate.add_argument("--seed", type=int, default=0, metavar="N", help="draws scene, noise and faults (0)")
+    emulate.add_argument(
+        "--control-mode",
+        choices=("status_only", "velocity", "position"),
+        help="the arm driver's flag (as the scenario says: position)",
+    )
+    emulate.add_argument(
+        "--fault",
+        action="append",
+        default=[],
+        metavar="WORD",
+        help="misbehave from the start, such as 'images drop 0.1' or 'status delay 0.03'; may be repeated",
+    )
+    emulate.add_argument(
+        "--say", metavar="WORD", help="tell a running emulator: reflex, stop, recover, 'die 2', or a fault"
+    )
+
+    segment = _add(
+        subparsers,
+        "segment",
+        commands.segment,
+        "Find the objects of a recording, without a robot: masks, a video, and scores where there are labels.\n"
+        "A recording is a folder in the TUM RGB-D layout with a camera.json, see docs/recordings.md.",
+    )
+    segment.add_argument("recording", type=Path, metavar="RECORDING", help="its folder")
+    segment.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/segment_NAME)")
+    segment.add_argument(
+        "--scenario",
+        type=Path,
+        metavar="FILE",
+        help="a YAML file (the recorded run's, or the built-in one)",
+    )
+    segment.add_argument(
+        "--seed", type=_seed, metavar="N", help="draws the samples (that of the recorded run, or 0)"
+    )
+    segment.add_argument(
+        "--robot", type=Path, metavar="FILE", help="URDF or SDF of the robot that joints.csv is of (the Panda)"
+    )
+    segment.add_argument(
+        "--camera-frame",
+        default="camera",
+        metavar="NAME",
+        help="frame of that robot: x right, y down, z ahead in the image (camera)",
+    )
+    segment.add_argument(
+        "--stamp-limit",
+        type=_seconds,
+        default=0.02,
+        metavar="S",
+        help="how far apart in time what belongs together may be, s (0.02)",
+    )
+
+    score = _add(
+        subparsers,
+        "score",
+        commands.score,
+        "Compare two folders of label PNGs with equal names, image by image.\n"
+        "Prints the ten figures of the field's protocol, as means over the images.",
+    )
+    score.add_argument("predicted", type=Path, metavar="PREDICTED", help="folder of predicted masks")
+    score.add_argument("true", type=Path, metavar="TRUE", help="folder of true masks")
+    score.add_argument("--json", type=Path, metavar="FILE", help="also write all figures, per image too")
+
+    bench = _add(
+        subparsers,
+        "bench",
+        commands.bench,
+        "Measure time and memory of every stage of the segmentation for a 640x480 image pair.\n"
+        "The pairs are a rendered push, held in memory; nothing is written.",
+    )
+    _add_scenario(bench)
+    bench.add_argument("--seed", type=int, default=0, metavar="N", help="draws the scene and the noise (0)")
+    bench.add_argument(
+        "--stream",
+        type=_positive,
+        metavar="SECONDS",
+        help="measure instead how evenly commands for a real arm are sent beside the segmentation",
+    )
+    bench.add_argument("--raft", action="store_true", help="measure RAFT instead, small and large")
+
+    diagram = _add(
+        subparsers,
+        "diagram",
+        commands.diagram,
+        "Draw the wired diagram of a scenario, as DOT or (with graphviz installed) as SVG.\n"
+        "Without an output file the DOT text goes to the terminal.",
+    )
+    _add_scenario(diagram)
+    diagram.add_argument("--output", type=Path, metavar="FILE", help="a file that ends in .dot or .svg")
+    return parser
+
+
+def _add(commands, name, call, explanation) -> argparse.ArgumentParser:  # type: ignore[no-untyped-def]
+    command = commands.add_parser(
+        name,
+        help=explanation.splitlines()[0],
+        description=explanation,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    command.set_defaults(call=call)
+    return command
+
+
+def _positive(text: str) -> int:
+    number = int(text) if text.isdecimal() else 0
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 up")
+    return number
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 up")
+    return int(text)
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = -1.0
+    if not 0 < seconds < 1e6:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds above 0")
+    return seconds
+
+
+def _add_scenario(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "scenario",
+        type=Path,
+        nargs="?",
+        metavar="SCENARIO",
+        help="a YAML file (the built-in simulation)",
+    )

@@ -1,0 +1,113 @@
+"""From what was asked for on the command line to the function that does it.
+
+Commands are imported when they are called: `riseg --help` shall not wait for Drake.
+"""
+
+import argparse
+import os
+
+from rich.console import Console
+
+
+def run(chosen: argparse.Namespace, console: Console) -> None:
+    """`riseg run`."""
+    from riseg_drake.app.run import run_command
+
+    run_command(chosen.scenario, chosen.seed, chosen.output, chosen.record, chosen.meshcat, console)
+
+
+def evaluate(chosen: argparse.Namespace, console: Console) -> None:
+    """`riseg evaluate`."""
+    from riseg_drake.app.evaluate import evaluate_command
+
+    evaluate_command(
+        chosen.scenes,
+        chosen.seed,
+        chosen.objects,
+        chosen.jobs,
+        chosen.output,
+        chosen.scenario,
+        chosen.dask,
+        chosen.ablation,
+        chosen.baseline,
+        chosen.masks,
+        console,
+    )
+
+
+def hardware(chosen: argparse.Namespace, console: Console) -> None:
+    """`riseg hardware`."""
+    # Threads that wait for each other busily take the processor from the drivers and from the commands.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    from riseg_drake.app.hardware import hardware_command
+
+    hardware_command(
+        chosen.scenario,
+        chosen.seed,
+        chosen.output,
+        chosen.record,
+        chosen.meshcat,
+        chosen.dry_run,
+        chosen.yes,
+        chosen.truth,
+        chosen.replayed,
+        console,
+    )
+
+
+def hand_eye(chosen: argparse.Namespace, console: Console) -> None:
+    """`riseg hand-eye`."""
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    from riseg_drake.app.hand_eye import hand_eye_command
+
+    hand_eye_command(chosen.scenario, chosen.output, chosen.yes, console)
+
+
+def emulate(chosen: argparse.Namespace, console: Console) -> None:
+    """`riseg emulate`."""
+    from riseg_drake.app.emulate import emulate_command
+
+    emulate_command(chosen.scenario, chosen.seed, chosen.control_mode, chosen.fault, chosen.say, console)
+
+
+def segment(chosen: argparse.Namespace, console: Console) -> None:
+    """`riseg segment`."""
+    from riseg_drake.app.segment_command import SegmentRequest, segment_command
+
+    segment_command(
+        SegmentRequest(
+            recording=chosen.recording,
+            output=chosen.output,
+            scenario=chosen.scenario,
+            seed=chosen.seed,
+            robot=chosen.robot,
+            camera_frame=chosen.camera_frame,
+            stamp_limit=chosen.stamp_limit,
+        ),
+        console,
+    )
+
+
+def score(chosen: argparse.Namespace, console: Console) -> None:
+    """`riseg score`."""
+    from riseg_drake.app.score_command import score_command
+
+    score_command(chosen.predicted, chosen.true, chosen.json, console)
+
+
+def bench(chosen: argparse.Namespace, console: Console) -> None:
+    """`riseg bench`."""
+    if chosen.raft:
+        from riseg_drake.app.raft_bench import raft_bench_command
+
+        return raft_bench_command(chosen.scenario, console)
+    from riseg_drake.app.bench import bench_command
+
+    bench_command(chosen.scenario, chosen.seed, chosen.stream, console)
+
+
+def diagram(chosen: argparse.Namespace, console: Console) -> None:
+    """`riseg diagram`."""
+    from riseg_drake.app.drawing import diagram_command
+
+    diagram_command(chosen.scenario, chosen.output, console)

@@ -1,0 +1,89 @@
+"""Sharper outlines in a run, and Segment Anything among the baselines."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from riseg_drake.app import refinement_block
+from riseg_drake.app.cli import main
+from riseg_drake.evaluation.scores import score
+from riseg_drake.learned.prompts import Answer
+
+
+def dilating(color, prompts):
+    """Stands in for a model: every mask that it is asked about, one pixel wider."""
+    for prompt in prompts:
+        wider = cv2.dilate(prompt.mask.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        yield Answer(wider[None], np.array([0.9]), np.array([1.0]))
+
+
+def read(path):
+    return cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+
+
+def with_sam(small_scenario, folder, path, more=""):
+    path.write_text(small_scenario.read_text() + f"sam: {{folder: {folder}{more}}}\n")
+    return path
+
+
+@pytest.mark.renders
+def test_a_run_leaves_refined_masks_beside_its_own_and_changes_none(small_scenario, tmp_path, monkeypatch):
+    monkeypatch.setattr(refinement_block, "load_sam", lambda folder, device: dilating)
+    scenario = with_sam(small_scenario, tmp_path, tmp_path / "sam.yaml", ", outlines: {with_mask: true}")
+    for name, file in (("with", scenario), ("without", small_scenario)):
+        assert main(["run", str(file), "--seed", "1", "--output", str(tmp_path / name)]) == 0
+    content = json.loads((tmp_path / "with" / "summary.json").read_text())
+    assert [step["step"] for step in content["steps"]] == [0, 1]
+    for step in content["steps"]:
+        folder = tmp_path / "with" / f"step_{step['step']}"
+        mask, refined = read(folder / "mask.png"), read(folder / "refined.png")
+        assert mask.tobytes() == read(tmp_path / "without" / folder.name / "mask.png").tobytes()
+        assert set(np.unique(refined)) == set(np.unique(mask))
+        assert step["refined_scores"] == pytest.approx(
+            score(refined, read(folder / "ground_truth.png")).as_dict()
+        )
+    assert (refined > 0).sum() > (mask > 0).sum() > 0
+    assert (refined[mask > 0] > 0).all()
+
+
+@pytest.mark.renders
+def test_an_evaluation_scores_a_real_model_alone_and_with_our_masks(small_scenario, tmp_path):
+    pytest.importorskip("torch", reason="SAM needs torch (pip install 'riseg-drake[sam]')")
+    pytest.importorskip("transformers", reason="SAM needs transformers (pip install 'riseg-drake[sam]')")
+    from tests.learned.tiny_sam import tiny_sam2
+
+    tiny_sam2().save_pretrained(tmp_path / "model")
+    scenario = with_sam(small_scenario, tmp_path / "model", tmp_path / "sam.yaml")
+    output = tmp_path / "out"
+    command = ["evaluate", "--scenario", str(scenario), "--scenes", "1", "--seed", "1", "--output", str(output)]
+    assert main(command) == 0
+    assert "SAM" not in json.loads((output / "summary.json").read_text())["methods"]
+    before = (output / "scene_000" / "summary.json").read_bytes()
+
+    # The same once more, with two more methods: only these are worked on.
+    assert main([*command, "--baseline", "sam", "--masks", f"again={output}"]) == 0
+    assert (output / "scene_000" / "summary.json").read_bytes() == before
+    methods = json.loads((output / "summary.json").read_text())["methods"]
+    assert set(methods) >= {"riseg_drake", "SAM", "riseg_drake + SAM", "again"}
+    # Random weights answer nonsense, which is refused.
+    assert methods["riseg_drake + SAM"] == methods["riseg_drake"] == methods["again"]
+    assert "| SAM | 1 |" in (output / "report.md").read_text()
+
+
+@pytest.mark.parametrize(
+    ("scenario", "says"),
+    [
+        ("{}", "--baseline sam needs a model"),
+        ("sam: {folder: /nowhere}", "/nowhere is no folder"),
+    ],
+)
+def test_without_a_model_the_evaluation_does_not_begin(tmp_path, capsys, scenario, says):
+    (tmp_path / "scene.yaml").write_text(scenario)
+    arguments = ["--scenario", str(tmp_path / "scene.yaml"), "--output", str(tmp_path / "out")]
+    assert main(["evaluate", "--baseline", "sam", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert says in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
