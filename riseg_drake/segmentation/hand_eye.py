@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.rgbd import Frame, FramePair, unhidden_depth
+from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.segmentation.expected_flow import expected_flow
 from riseg_drake.segmentation.optical_flow import DisFlow
 
@@ -53,7 +53,7 @@ def flow_errors(frames: Sequence[Frame]) -> list[FlowError]:
     for index, current in enumerate(frames):
         for reference in reversed(frames[:index]):
             pair = FramePair(reference, current)
-            depth = unhidden_depth(reference)
+            depth = reference.unhidden_depth
             expected = expected_flow(depth, pair.X_C1C0, current.intrinsics)
             known = depth > 0
             span = float(np.median(np.linalg.norm(expected[known], axis=-1))) if known.any() else 0.0
