@@ -22,7 +22,7 @@ def raft_bench_command(scenario_file: Path | None, console: Console) -> None:
     from riseg_drake.learned.raft import Raft
     from riseg_drake.learned.raft_checkpoint import SIZES
 
-    camera, chosen = scenario.station.camera, scenario.optical_flow.raft
+    camera, chosen = scenario.station.camera.intrinsics, scenario.optical_flow.raft
     device = torch_device(chosen.device)
     rng = np.random.default_rng(0)
     images = rng.integers(0, 256, (2, camera.height, camera.width, 3)).astype(np.uint8)

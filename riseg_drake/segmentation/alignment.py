@@ -169,7 +169,7 @@ class _Image:
     def __init__(self, pair: FramePair, depth_noise: float) -> None:
         self.X_C1C0, self.intrinsics = pair.X_C1C0, pair.current.intrinsics
         self.gray, self.depth = pair.current.unhidden_gray, pair.current.unhidden_depth
-        self.depth_noise = np.sqrt(2) * depth_noise
+        self.depth_noise = float(np.sqrt(2)) * depth_noise
 
     def cost(self, edges: EdgePixels, motion: NDArray) -> NDArray[np.float32]:
         """How badly a motion explains each pixel [N]: 2 where it is right, 18 at most."""

@@ -180,7 +180,7 @@ def motion_costs(
         sought = seek(pieces.witnesses, pair.X_C1C0 @ motion)
         z_1 = sought.read(depth_1)
         photometric = np.minimum((sought.read_between(gray_1) - pieces.gray) ** 2 * per_variance, ceiling)
-        sigma = depth_sigma(sought.depth, np.float32(np.sqrt(2) * depth_noise))
+        sigma = depth_sigma(sought.depth, float(np.sqrt(2)) * depth_noise)
         geometric = np.minimum(((z_1 - sought.depth) / sigma) ** 2, ceiling)
         both = photometric + np.where(z_1 > 0, geometric, np.float32(1))
         # What cannot be compared speaks neither for nor against: the value expected of a match.

@@ -60,7 +60,7 @@ def flow_around(above_0: AboveTable, pair: FramePair, method: FlowMethod) -> NDA
     columns, shifted_columns = _seen_in_both(columns, du, width)
     if rows.start < rows.stop and columns.start < columns.stop:
         images = pair.reference.color[rows, columns], pair.current.color[shifted_rows, shifted_columns]
-        np.add(method(*images), np.float32([du, dv]), out=flow[rows, columns])
+        np.add(method(*images), np.array([du, dv], np.float32), out=flow[rows, columns])
     return flow
 
 

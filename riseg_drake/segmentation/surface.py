@@ -90,7 +90,7 @@ def seek(pixels: SurfacePixels, X_C1C0: NDArray[np.float64]) -> Sought:
     depth = pixels.depth * c[: len(pixels)]
     if c.min() <= 0:
         # What is not ahead of the camera is sought far outside the image.
-        a, b, c = np.where(c > 0, (a, b, c), np.float32([[-1e4], [-1e4], [1]]))
+        a, b, c = np.where(c > 0, (a, b, c), np.array([[-1e4], [-1e4], [1]], np.float32))
     a /= c
     b /= c
     return Sought(a.reshape(-1, _ROW), b.reshape(-1, _ROW), depth)
