@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.renders
+
 CHECKOUT = Path(__file__).parents[1]
 NOWHERE = "http://127.0.0.1:9"
 """A proxy that answers nothing. (With DRAKE_ALLOW_NETWORK=none Drake's Parser cannot even be made.)"""

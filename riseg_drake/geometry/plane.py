@@ -23,7 +23,7 @@ class PlaneFitParameters:
     hypotheses: int = 256
     """Planes through three random points that are tried. With a third of the points on the table, one
     in 27 is right, so the chance that none is lies below 1e-4."""
-    points: int = 4096
+    points: int = 2048
     """Random pixels that take part; the first quarter of them score the hypotheses."""
     tolerance: float = 0.003
     """Distance, m, within which a point without depth noise would count as lying on the plane."""

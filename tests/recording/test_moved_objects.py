@@ -13,6 +13,8 @@ from riseg_drake.systems.frame_view import FrameView
 from tests.recording.moved_objects import moved_film, sideways
 from tests.segmentation.drawn_scene import CAMERA, Blank, DrawnScene, Texture, looking_down, planar
 
+pytestmark = pytest.mark.renders
+
 VGA = Intrinsics(640, 480, 616.2, 615.8, 316.4, 238.8)
 SIZES = [(0.07, 0.06, 0.03), (0.06, 0.08, 0.05), (0.05, 0.05, 0.04)]
 PLACES = [planar(-0.08, 0.03, 0.3), planar(0.05, 0.05), planar(0.02, -0.07, 1.0)]

@@ -24,6 +24,8 @@ from tests.segmentation.drawn_scene import (
     standing,
 )
 
+pytestmark = pytest.mark.renders
+
 SIZES = [(0.08, 0.07, 0.03), (0.06, 0.08, 0.05)]
 PLACES = [planar(-0.06, 0.0), planar(0.06, 0.0)]
 CAMERAS = (looking_down(), looking_down(0.004, -0.003))

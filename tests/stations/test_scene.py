@@ -204,6 +204,7 @@ def test_every_object_shows_in_the_label_image_of_a_camera_half_a_metre_up(scene
     assert not border.any()
 
 
+@pytest.mark.renders
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -243,6 +244,7 @@ def test_a_model_that_cannot_be_used_is_named(tmp_path, text, message):
     assert str(tmp_path) in str(error.value)
 
 
+@pytest.mark.renders
 def test_a_model_that_falls_over_is_named(tmp_path):
     tower = sdf("<cylinder><radius>0.02</radius><length>0.06</length></cylinder>", pose="0 0 0 0.9 0 0")
     (tmp_path / "tower.sdf").write_text(tower)
