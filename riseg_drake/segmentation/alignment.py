@@ -34,7 +34,7 @@ class AlignmentParameters:
 
     rounds: int = 2
     """Gauss-Newton steps; 0 leaves the motions as the body frames have them."""
-    pixels: int = 1500
+    pixels: int = 2000
     """At most so many pixels of the reference frame take part."""
     turn: float = 0.03
     """rad; how well the body frames know a motion's rotation."""

@@ -20,16 +20,14 @@ def pixel_projection(X_C1C0: NDArray[np.float64], intrinsics: Intrinsics) -> NDA
     Returns:
         M [3, 4].
     """
-    K = np.array(
-        [
-            [intrinsics.fx, 0.0, intrinsics.cx],
-            [0.0, intrinsics.fy, intrinsics.cy],
-            [0.0, 0.0, 1.0],
-        ]
-    )
-    return (K @ X_C1C0[:3] @ np.block([[np.linalg.inv(K), np.zeros((3, 1))], [np.zeros((1, 3)), 1.0]])).astype(
-        np.float32
-    )
+    k = intrinsics
+    K = np.array([[k.fx, 0.0, k.cx], [0.0, k.fy, k.cy], [0.0, 0.0, 1.0]])
+    M = K @ X_C1C0[:3]
+    # Its first three columns times K^-1, written out: this is asked for with every motion.
+    M[:, 0] /= k.fx
+    M[:, 1] /= k.fy
+    M[:, 2] -= k.cx * M[:, 0] + k.cy * M[:, 1]
+    return M.astype(np.float32)
 
 
 def expected_flow(
@@ -49,8 +47,8 @@ def expected_flow(
     u = np.arange(intrinsics.width, dtype=np.float32)[None, :]
     v = np.arange(intrinsics.height, dtype=np.float32)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
+        # Where there is no depth this is infinite, and the flow, infinite by infinite, not a number.
         inverse_depth = np.float32(1) / depth_0
-        inverse_depth[~(depth_0 > 0)] = np.nan
 
         def row(k: int) -> NDArray[np.float32]:
             value = M[k, 3] * inverse_depth
@@ -59,7 +57,7 @@ def expected_flow(
             return value
 
         c = row(2)
-        c[~(c > 0)] = np.nan
+        c[c <= 0] = np.nan
         flow = np.empty((*depth_0.shape, 2), np.float32)
         for k, start in enumerate((u, v)):
             moved = row(k)

@@ -76,8 +76,6 @@ class DisFlowParameters:
 
     preset: str = field(default="medium", metadata={"choices": tuple(DIS_PRESETS)})
     """"ultrafast", "fast" or "medium": 2, 3 and 14 ms at 640x480 on two cores."""
-    patch_stride: int = 4
-    """Pixels between the patches that are matched; OpenCV's medium has 3, which takes a third longer."""
 
 
 class DisFlow:
@@ -85,12 +83,10 @@ class DisFlow:
 
     def __init__(self, parameters: DisFlowParameters | None = None) -> None:
         """Prepare the method; ValueError for an unknown preset."""
-        parameters = parameters or DisFlowParameters()
-        preset = parameters.preset
+        preset = (parameters or DisFlowParameters()).preset
         if preset not in DIS_PRESETS:
             raise ValueError(f"no DIS preset {preset!r}: choose one of {', '.join(DIS_PRESETS)}")
         self._dis = cv2.DISOpticalFlow_create(DIS_PRESETS[preset])
-        self._dis.setPatchStride(parameters.patch_stride)
 
     def __call__(self, color_0: NDArray[np.uint8], color_1: NDArray[np.uint8]) -> NDArray[np.float32]:
         """Flow O_t [H, W, 2], pixels."""
