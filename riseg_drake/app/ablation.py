@@ -22,8 +22,6 @@ Switch = Mapping[str, Any]
 SWITCHES: dict[str, Switch] = {
     "body frames: triplets, not patches": {"bfif.frames.kind": "triplets"},
     "covariance: of the sample, not propagated": {"bfif.grouping.covariance": "sample"},
-    "grouping: Markov clustering has the last word": {"bfif.settling_rounds": 0},
-    "space frame: the camera, not amid the points": {"bfif.space_frame": "camera"},
     "pair: consecutive frames, not by motion": {"frame_pair.kind": "consecutive"},
     "outline: growth over similar flow, not by motion": {"segment.outline": "flow"},
     "propagation: every frame by O_t, not from the reference": {"segment.propagation": "flow"},

@@ -18,8 +18,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import find_objects
 
-from riseg_drake.geometry.camera import bounding_region
+from riseg_drake.geometry.camera import Region, bounding_region
 
 UNKNOWN = np.uint16(65535)
 """Label of pixels above the table that no object has claimed yet; never leaves the propagator."""
@@ -86,12 +87,27 @@ def associate(
     """
     decision = _Decision(known, previous, episode, pixels_per_metre, parameters)
     moving = np.where(known.label > 0, moving, 0)
+    unknown = known.label == UNKNOWN
+    boxes = find_objects(np.where(unknown, 0, known.label))
     for a in known.born:
-        decision.place_known(a, moving, motion_gap)
-    for g in range(1, int(moving.max(initial=0)) + 1):
-        decision.place_unknown(g, (moving == g) & (known.label == UNKNOWN))
+        if a <= len(boxes) and boxes[a - 1] is not None:
+            decision.place_known(a, boxes[a - 1], moving, motion_gap)
+    unknown_moving = np.where(unknown, moving, 0)
+    for g in range(1, int(unknown_moving.max(initial=0)) + 1):
+        decision.place_unknown(g, unknown_moving == g)
     decision.name_pieces()
     return Association(decision.label, decision.motion_of, decision.born, decision.next_id)
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A part of the view that becomes an object."""
+
+    box: Region
+    inside: NDArray[np.bool_]
+    """Its pixels in that box."""
+    moving: int
+    """1 + its group, 0 = it stands still."""
 
 
 class _Decision:
@@ -111,17 +127,15 @@ class _Decision:
         self.born = dict(known.born)
         self.next_id = known.next_id
         self.motion_of: dict[int, int] = {}
-        self.pieces: list[tuple[NDArray[np.bool_], int]] = []
+        self.pieces: list[_Piece] = []
         self.pixels_min = parameters.area_min * pixels_per_metre**2
         radius = max(1, round(parameters.rim * pixels_per_metre))
         self.rim = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
 
-    def place_known(self, a: int, moving: NDArray[np.int16], motion_gap: NDArray) -> None:
-        """Which motion a known object has, and whether it must be split."""
-        inside = self.known.label == a
-        area = np.bincount(moving[inside], minlength=len(motion_gap))
-        if not area.any():
-            return
+    def place_known(self, a: int, box: Region, moving: NDArray[np.int16], motion_gap: NDArray) -> None:
+        """Which motion a known object has, that lies in a box of the view, and whether it must be split."""
+        inside = self.known.label[box] == a
+        area = np.bincount(moving[box][inside], minlength=len(motion_gap))
         main = int(area.argmax())
         if main > 0:
             self.motion_of[a] = main - 1
@@ -130,17 +144,21 @@ class _Decision:
                 continue
             if motion_gap[g, main] < self.parameters.split_flow:
                 continue
-            part = inside & (moving == g)
+            part = inside & (moving[box] == g)
             if not self._is_solid(part):
                 continue
             if self.born[a] == self.episode and g == 0:
                 # It was found in this very episode, and too much of it: give the rest back.
-                self.label[part] = UNKNOWN
+                self.label[box][part] = UNKNOWN
             else:
-                self.pieces.append((part, int(g)))
+                self.pieces.append(_Piece(box, part, int(g)))
 
     def place_unknown(self, g: int, region: NDArray[np.bool_]) -> None:
         """Whose the unknown pixels are that move with group g - 1."""
+        if not region.any():
+            return
+        box = bounding_region(region, margin=len(self.rim))
+        region, known, label = region[box], self.known.label[box], self.label[box]
         count, piece, stats, _ = cv2.connectedComponentsWithStats(region.astype(np.uint8), connectivity=4)
         owner = np.zeros(count, np.uint16)
         solid = {
@@ -153,14 +171,14 @@ class _Decision:
             key=lambda a: self.born[a] != self.episode,
         )
         for a in young_first:
-            near = cv2.dilate((self.known.label == a).astype(np.uint8), self.rim) > 0
+            near = cv2.dilate((known == a).astype(np.uint8), self.rim) > 0
             for number in np.unique(piece[near & region]):
                 if owner[number] == 0 and (self.born[a] == self.episode or number not in solid):
                     owner[number] = a
-        self.label[region] = np.where(owner[piece[region]] > 0, owner[piece[region]], self.label[region])
+        label[region] = np.where(owner[piece[region]] > 0, owner[piece[region]], label[region])
         for number in sorted(solid):
             if owner[number] == 0:
-                self.pieces.append((piece == number, g))
+                self.pieces.append(_Piece(box, piece == number, g))
 
     def _is_solid(self, region: NDArray[np.bool_]) -> bool:
         """Whether a region is more than a rim, and large enough."""
@@ -179,27 +197,27 @@ class _Decision:
     def name_pieces(self) -> None:
         """Label the new objects: by the ids of the frame before where they are the same pieces."""
         former = self._former_ids()
-        for number, (inside, g) in enumerate(self.pieces):
+        for number, piece in enumerate(self.pieces):
             a = former.get(number)
             if a is None:
                 a = self.next_id
             self.next_id = max(self.next_id, a + 1)
             self.born[a] = self.episode
-            self.label[inside] = a
-            if g > 0:
-                self.motion_of[a] = g - 1
+            self.label[piece.box][piece.inside] = a
+            if piece.moving > 0:
+                self.motion_of[a] = piece.moving - 1
 
     def _former_ids(self) -> dict[int, int]:
         """For the pieces that were there in the frame before, their ids; greatest overlap first."""
         if self.previous is None:
             return {}
         overlaps = []
-        for number, (inside, _) in enumerate(self.pieces):
-            candidates, shared = np.unique(self.previous[inside], return_counts=True)
+        for number, piece in enumerate(self.pieces):
+            candidates, shared = np.unique(self.previous[piece.box][piece.inside], return_counts=True)
             for a, pixels in zip(candidates.tolist(), shared.tolist(), strict=True):
                 if a in (0, UNKNOWN) or a in self.known.born:
                     continue
-                smaller = min(np.count_nonzero(inside), np.count_nonzero(self.previous == a))
+                smaller = min(np.count_nonzero(piece.inside), np.count_nonzero(self.previous == a))
                 if pixels >= self.parameters.same_share * smaller:
                     overlaps.append((pixels, number, a))
         former: dict[int, int] = {}

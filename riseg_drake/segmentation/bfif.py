@@ -14,15 +14,13 @@ from riseg_drake.segmentation.body_frames import (
     sample_body_frames,
 )
 from riseg_drake.segmentation.effective_flow import MovingParameters, moving_pixels
-from riseg_drake.segmentation.grouping import GroupingParameters, group_twists, renumbered
+from riseg_drake.segmentation.grouping import GroupingParameters, group_twists
 from riseg_drake.segmentation.motions import (
     BFIFGroups,
     MotionParameters,
     flow_difference,
     group_motions,
     merge_equal_motions,
-    misfits,
-    settle_groups,
 )
 from riseg_drake.segmentation.noise import MeasurementNoise, flow_sigma
 from riseg_drake.segmentation.twists import (
@@ -43,11 +41,6 @@ class BFIFParameters:
     frames: BodyFrameParameters = field(default_factory=BodyFrameParameters)
     grouping: GroupingParameters = field(default_factory=GroupingParameters)
     motions: MotionParameters = field(default_factory=MotionParameters)
-    settling_rounds: int = 2
-    """How often groups are settled by their fitted motions; 0 leaves Markov clustering the last word,
-    as in the paper."""
-    space_frame: str = field(default="points", metadata={"choices": ("points", "camera")})
-    """Where {s} lies: "points" (amid the moving points) or "camera" (C0, as in the paper)."""
 
 
 def group_body_frames(
@@ -87,7 +80,11 @@ def group_body_frames(
     twists = _calc_bfifs(frames, precision, prior, parameters)
     rigid = _on_one_body(twists, parameters.motions.misfit_max)
     frames, twists, precision = frames.subset(rigid), twists.subset(rigid), precision[rigid]
-    group, motions = _settled_groups(frames, twists, precision, focal_length, prior, parameters)
+    group = group_twists(twists, parameters.grouping)
+    motions = group_motions(frames, group, precision, prior)
+    joined = merge_equal_motions(frames, group, motions, focal_length, parameters.motions)
+    if not np.array_equal(joined, group):
+        group, motions = joined, group_motions(frames, joined, precision, prior)
     seeds = frames.p_C0Q0[:, 0]
     spans = [flow_difference(seeds[group == g], X, np.eye(4), focal_length) for g, X in enumerate(motions)]
     return BFIFGroups(
@@ -110,43 +107,6 @@ def _on_one_body(twists: Twists, misfit_max: float) -> NDArray[np.bool_]:
     return twists.misfit <= misfit_max * max(1.0, float(np.median(twists.misfit)))
 
 
-def _settled_groups(
-    frames: BodyFrames,
-    twists: Twists,
-    precision: NDArray[np.float64],
-    focal_length: float,
-    prior: NDArray[np.float64],
-    parameters: BFIFParameters,
-) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Line 6, GroupBFIFs: the group of each frame, and the groups' motions.
-
-    Markov clustering proposes groups; frames that a group's motion does not explain are clustered
-    again among themselves, and motions that cannot be told apart are joined.
-    """
-
-    group = group_twists(twists, parameters.grouping)
-    motions = group_motions(frames, group, precision, prior)
-
-    def regroup(following: NDArray[np.intp]) -> bool:
-        """Take these groups instead, and their motions; False if they are the same."""
-        nonlocal group, motions
-        if np.array_equal(following, group):
-            return False
-        group, motions = following, group_motions(frames, following, precision, prior)
-        return True
-
-    for _ in range(parameters.settling_rounds):
-        misfit = misfits(frames, motions, precision)
-        settled = settle_groups(frames, misfit, twists.misfit, parameters.motions)
-        left = settled < 0
-        again = group_twists(twists.subset(left), parameters.grouping)
-        settled[left] = np.where(again >= 0, again + misfit.shape[1], -1)
-        if not regroup(renumbered(settled, parameters.grouping.members_min)):
-            break
-    regroup(merge_equal_motions(frames, group, motions, focal_length, parameters.motions))
-    return group, motions
-
-
 def no_groups() -> BFIFGroups:
     """G_t where nothing moves."""
     return BFIFGroups(
@@ -167,11 +127,12 @@ def _calc_bfifs(
     prior: NDArray[np.float64],
     parameters: BFIFParameters,
 ) -> Twists:
-    """Line 5, CalcBFIFs, in the space frame that the parameters ask for."""
-    if parameters.space_frame not in ("points", "camera"):
-        raise ValueError(f"no space frame {parameters.space_frame!r}: choose points or camera")
-    at_points = parameters.space_frame == "points"
-    p_C0S = frames.p_C0Q0[:, 0].mean(0) if at_points else np.zeros(3)
+    """Line 5, CalcBFIFs.
+
+    Mahalanobis distances are the same in every space frame. Amid the moving points twists are small and
+    read well; at the camera, where the paper has {s}, a turn of the body is a large displacement, too.
+    """
+    p_C0S = frames.p_C0Q0[:, 0].mean(0)
     if parameters.frames.kind == "triplets":
         return triplet_twists(frames, p_C0S)
     return patch_twists(frames, p_C0S, precision, prior)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import bounding_region, rays, rays_at
+from riseg_drake.geometry.camera import rays, rays_at
 from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.geometry.se3 import inverse, move_points
 
@@ -145,14 +145,17 @@ def _spread_seeds(good: NDArray[np.bool_], count: int, rng: np.random.Generator)
     """
     if not good.any():
         return np.empty((0, 2), np.intp)
-    region = bounding_region(good)
-    vu = np.argwhere(good[region]) + np.array([region[0].start, region[1].start])
-    if len(vu) <= count:
-        return vu
-    vu = rng.permutation(vu)
-    cell = max(1, int(np.sqrt(len(vu) / count)))
-    _, first = np.unique((vu[:, 0] // cell) * good.shape[1] + vu[:, 1] // cell, return_index=True)
-    return vu[rng.permutation(first)[:count]]
+    pixel = rng.permutation(np.flatnonzero(good))
+    v, u = np.divmod(pixel, good.shape[1])
+    if len(pixel) > count:
+        cell = max(1, int(np.sqrt(len(pixel) / count)))
+        columns = good.shape[1] // cell + 1
+        # Of the pixels of one cell, in random order, the last stays.
+        chosen = np.full(columns * (good.shape[0] // cell + 1), -1)
+        chosen[v // cell * columns + u // cell] = np.arange(len(pixel))
+        which = rng.permutation(chosen[chosen >= 0])[:count]
+        v, u = v[which], u[which]
+    return np.stack([v, u], axis=1)
 
 
 def _extent_ratio(p: NDArray, used: NDArray[np.bool_]) -> NDArray:

@@ -58,17 +58,15 @@ def moving_pixels(
     window = 2 * max(1, round(0.5 * parameters.window * pixels_per_metre)) + 1
 
     flow_min = max(parameters.flow_min, parameters.residual_multiple * pair.residual)
-    region = bounding_region(above_0.mask, margin=window)
+    region = bounding_region(above_0.mask)
     X_t = effective_flow(optical_flow[region], expected_flow[region])
     with np.errstate(invalid="ignore"):
-        candidate = above_0.mask[region] & (X_t[..., 0] ** 2 + X_t[..., 1] ** 2 > flow_min**2)
-    if np.count_nonzero(candidate) < pixels_min:
-        return moving
-    evidence = zero_motion_evidence(pair, expected_flow, optical_flow, region, noise, window)
-    candidate &= evidence > parameters.evidence_min
-    if np.count_nonzero(candidate) >= pixels_min:
-        moving[region] = candidate
-    return moving
+        moving[region] = above_0.mask[region] & (X_t[..., 0] ** 2 + X_t[..., 1] ** 2 > flow_min**2)
+    if np.count_nonzero(moving) >= pixels_min:
+        region = bounding_region(moving, margin=window)
+        evidence = zero_motion_evidence(pair, expected_flow, optical_flow, region, noise, window)
+        moving[region] &= evidence > parameters.evidence_min
+    return moving if np.count_nonzero(moving) >= pixels_min else np.zeros_like(moving)
 
 
 def zero_motion_evidence(

@@ -127,7 +127,8 @@ def label_by_motion(
     """
     count = pieces.pieces.count
     cost = motion_costs(pair, pieces, motions, depth_noise, parameters.cost_max)
-    unary = np.stack([np.bincount(pieces.piece, c, count) for c in cost]) / parameters.correlated_pixels
+    sums = np.array([np.bincount(pieces.piece, c, count) for c in cost], np.float32)
+    unary = sums / np.float32(parameters.correlated_pixels)
     label = _fewest_labels(unary, pieces, parameters)
     out = np.zeros(pair.reference.depth.shape, np.int16)
     # The last entry is for what is in no piece, whose number is -1.
@@ -136,7 +137,7 @@ def label_by_motion(
 
 
 def _fewest_labels(
-    unary: NDArray[np.float64], pieces: ReferencePieces, parameters: MotionLabelParameters
+    unary: NDArray[np.float32], pieces: ReferencePieces, parameters: MotionLabelParameters
 ) -> NDArray[np.intp]:
     """Label the pieces by their costs [1 + G, pieces], and drop, one by one, the motions not needed.
 
@@ -144,8 +145,9 @@ def _fewest_labels(
     surface fits many motions and must not be shared out among them. Standing still is always there.
     """
     needed = list(range(len(unary)))
+    message = None
     while True:
-        label = potts_labels(unary[needed], pieces.graph)
+        label, message = potts_labels(unary[needed], pieces.graph, message)
         gains = []
         for k in range(1, len(needed)):
             mine = label == k
@@ -157,7 +159,10 @@ def _fewest_labels(
             gains.append(gain * parameters.correlated_pixels / pieces.area[mine].sum())
         if not gains or min(gains) >= parameters.gain_min:
             return np.array(needed)[label]
-        del needed[int(np.argmin(gains)) + 1]
+        dropped = int(np.argmin(gains)) + 1
+        del needed[dropped]
+        # The others' messages are a good start.
+        message = np.delete(message, dropped, axis=0)
 
 
 def motion_costs(

@@ -32,8 +32,8 @@ class MotionParameters:
     lift: float = 0.002
     """m; how much they are expected to rise or sink (infinite in the paper)."""
     misfit_max: float = 3.0
-    """A body frame belongs to a motion that explains its points at most so many times worse than its
-    own best motion does (mean squared residual)."""
+    """A body frame whose own best motion leaves a mean squared residual so many times that of the median
+    frame lies across two bodies."""
 
 
 @dataclass(frozen=True)
@@ -93,40 +93,6 @@ def group_motions(
     return translation(centre) @ exp_se3(V_B) @ translation(-centre)
 
 
-def misfits(frames: BodyFrames, motions: NDArray, precision: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean squared normalised residual [K, G] of each body frame's points under each motion [G, 4, 4]."""
-    count = 3.0 * frames.used.sum(1)
-    columns = []
-    for X in motions:
-        residual = (frames.p_C0Q1 - move_points(X, frames.p_C0Q0))[..., None]
-        squared = (residual * (precision @ residual)).sum((-2, -1))
-        columns.append((squared * frames.used).sum(1) / count)
-    return np.stack(columns, axis=1) if columns else np.empty((len(frames), 0))
-
-
-def settle_groups(
-    frames: BodyFrames,
-    misfit: NDArray[np.float64],
-    own_misfit: NDArray[np.float64],
-    parameters: MotionParameters,
-) -> NDArray[np.intp]:
-    """Each body frame's group once more, now that the groups' motions are known; -1 where none fits.
-
-    Clusters compare twists two by two; a motion fitted to a whole group is far sharper than that.
-
-    Args:
-        frames: K body frames.
-        misfit: [K, G], of each frame under each group's motion.
-        own_misfit: [K], of each frame under its own motion.
-        parameters: see there.
-    """
-    if misfit.shape[1] == 0:
-        return np.full(len(frames), -1)
-    best = misfit.argmin(1)
-    fits = misfit.min(1) <= parameters.misfit_max * np.maximum(own_misfit, 1.0)
-    return np.where(fits, best, -1)
-
-
 def flow_difference(p_C0Q: NDArray, X: NDArray, Y: NDArray, focal_length: float) -> float:
     """How far apart, in pixels (root mean square), two motions X, Y [4, 4] of C0 take points [N, 3]."""
     apart = (move_points(X, p_C0Q) - move_points(Y, p_C0Q))[:, :2] * (focal_length / p_C0Q[:, 2:])
@@ -165,8 +131,10 @@ def merge_equal_motions(
 
 def motion_gaps(p_C0Q: NDArray, motions: NDArray, focal_length: float) -> NDArray[np.float64]:
     """Pixels by which standing still (index 0) and the motions [G, 4, 4] differ, [1 + G, 1 + G]."""
-    all_motions = [np.eye(4), *motions]
-    return np.array([[flow_difference(p_C0Q, X, Y, focal_length) for Y in all_motions] for X in all_motions])
+    moved = np.stack([p_C0Q[:, :2], *(move_points(X, p_C0Q)[:, :2] for X in motions)])
+    moved *= focal_length / p_C0Q[:, 2:]
+    apart = moved[:, None] - moved[None]
+    return np.sqrt((apart**2).sum(-1).mean(-1))
 
 
 def with_earlier_motions(

@@ -25,7 +25,12 @@ class PottsGraph:
         """Where the messages to each node begin; a node without borders has one from itself, worth 0."""
 
 
-def potts_labels(unary: NDArray[np.float64], graph: PottsGraph, rounds: int = 30) -> NDArray[np.intp]:
+def potts_labels(
+    unary: NDArray[np.float32],
+    graph: PottsGraph,
+    message: NDArray[np.float32] | None = None,
+    rounds: int = 30,
+) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
     """Labels x [N] that nearly minimise sum unary[x_i, i] + sum weight[e] [x_i != x_j].
 
     Min-sum belief propagation: exact on trees, close on the planar graphs of image pieces.
@@ -33,11 +38,14 @@ def potts_labels(unary: NDArray[np.float64], graph: PottsGraph, rounds: int = 30
     Args:
         unary: [L, N], cost of each label at each node.
         graph: the nodes and what their borders cost.
-        rounds: of message passing.
+        message: [L, messages] to start from, of a problem much like this one; nothing said yet if None.
+        rounds: of message passing, at most.
+
+    Returns:
+        x, and the messages at the end.
     """
-    unary = unary.astype(np.float32)
-    message = np.zeros((len(unary), len(graph.source)), np.float32)
-    belief = unary
+    message = np.zeros((len(unary), len(graph.source)), np.float32) if message is None else message.copy()
+    belief = unary + np.add.reduceat(message, graph.first, axis=1)
     for _ in range(rounds):
         outgoing = belief.take(graph.source, axis=1)
         outgoing -= message.take(graph.twin, axis=1)
@@ -50,4 +58,4 @@ def potts_labels(unary: NDArray[np.float64], graph: PottsGraph, rounds: int = 30
         belief = unary + np.add.reduceat(message, graph.first, axis=1)
         if max(outgoing.max(), -outgoing.min()) < 1e-2:
             break
-    return belief.argmin(0)
+    return belief.argmin(0), message

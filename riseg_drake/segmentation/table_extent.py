@@ -48,15 +48,15 @@ def off_table(
     table = _largest_piece(on_table)[::2, ::2]
     if np.count_nonzero(table) < 12:
         return None
-    map_of_table, origin = _map(feet[table])
+    hull, size, origin = _hull(feet[table])
     with np.errstate(invalid="ignore"):
         sunk = few < -max(0.05, 5 * height_min)
-        outside = (few > height_min) & ~_marked(_grown(map_of_table, _FAR), feet, origin)
+        outside = (few > height_min) & ~_marked(_map(hull, size, _FAR), feet, origin)
     seen = np.isfinite(few) & ~frame.robot[every]
     if np.count_nonzero((sunk | outside) & seen) < _ELSEWHERE_SHARE * few.size:
         return None
     feet = _feet(rays(frame.intrinsics), frame.depth, along)
-    return ~_marked(_grown(map_of_table, _MARGIN), feet, origin)
+    return ~_marked(_map(hull, size, _MARGIN), feet, origin)
 
 
 def _axes(normal: NDArray) -> NDArray[np.float32]:
@@ -84,21 +84,24 @@ def _largest_piece(on_table: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return (broad > 0) & (label == np.argmax(stats[:, cv2.CC_STAT_AREA]))
 
 
-def _map(feet: NDArray) -> tuple[NDArray[np.uint8], NDArray]:
-    """The convex hull of points on the plane, in cells, with room to grow around it; and where it begins, m."""
+def _hull(feet: NDArray) -> tuple[NDArray[np.int32], tuple[int, int], NDArray]:
+    """The convex hull of points on the plane, cells (x, y), the size of a map with room to grow it, and
+    where that begins, m."""
     middle = np.median(feet, axis=0)
     near = np.clip(feet, middle - _REACH, middle + _REACH)
     origin = near.min(axis=0) - 2 * _FAR
     cells = ((near - origin) / _CELL).astype(np.int32)
     width, height = cells.max(axis=0) + int(2 * _FAR / _CELL)
-    picture = np.zeros((height, width), np.uint8)
-    cv2.fillConvexPoly(picture, cv2.convexHull(cells.reshape(-1, 1, 2)), 1)
-    return picture, origin
+    return cv2.convexHull(cells.reshape(-1, 1, 2)), (int(height), int(width)), origin
 
 
-def _grown(picture: NDArray[np.uint8], margin: float) -> NDArray[np.uint8]:
-    radius = round(margin / _CELL)
-    return cv2.dilate(picture, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1)))
+def _map(hull: NDArray[np.int32], size: tuple[int, int], margin: float) -> NDArray[np.uint8]:
+    """1 inside of a convex hull and as far outside as a margin, m, goes."""
+    picture = np.zeros(size, np.uint8)
+    cv2.fillConvexPoly(picture, hull, 1)
+    # A thick outline: half of it lies outside.
+    cv2.polylines(picture, [hull], True, 1, thickness=2 * round(margin / _CELL) + 1)
+    return picture
 
 
 def _marked(picture: NDArray[np.uint8], feet: NDArray, origin: NDArray) -> NDArray[np.bool_]:

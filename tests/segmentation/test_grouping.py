@@ -12,7 +12,7 @@ from riseg_drake.segmentation.grouping import (
     markov_clusters,
     renumbered,
 )
-from riseg_drake.segmentation.twists import Twists
+from riseg_drake.segmentation.twists import Twists, change_space_frame
 
 
 def graph(size: int, *edges: tuple[int, int]) -> np.ndarray:
@@ -68,6 +68,16 @@ def test_sample_covariance_makes_distances_free_of_units() -> None:
     V = np.random.default_rng(1).normal(size=(40, 6))
     scaled = V * [1, 10, 100, 0.1, 1, 5]
     np.testing.assert_allclose(mahalanobis_sample(V), mahalanobis_sample(scaled), rtol=1e-6)
+
+
+def test_distances_are_the_same_in_every_space_frame() -> None:
+    rng = np.random.default_rng(3)
+    V, A = rng.normal(size=(12, 6)), rng.normal(size=(12, 6, 6))
+    covariance = A @ A.swapaxes(1, 2)
+    V_elsewhere, covariance_elsewhere = change_space_frame(V, covariance, np.array([0.4, -0.3, 0.6]))
+    own = mahalanobis_own(V_elsewhere, covariance_elsewhere)
+    np.testing.assert_allclose(own, mahalanobis_own(V, covariance), rtol=1e-6)
+    np.testing.assert_allclose(mahalanobis_sample(V_elsewhere), mahalanobis_sample(V), rtol=1e-6)
 
 
 def test_similarity_at_the_kernel_width_is_exp_minus_a_half() -> None:

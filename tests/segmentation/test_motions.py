@@ -11,9 +11,7 @@ from riseg_drake.segmentation.motions import (
     flow_difference,
     group_motions,
     merge_equal_motions,
-    misfits,
     motion_gaps,
-    settle_groups,
     with_earlier_motions,
 )
 from riseg_drake.segmentation.twists import point_precision
@@ -95,17 +93,6 @@ def test_different_motions_stay_different_groups(other: np.ndarray) -> None:
 def test_a_group_that_stands_still_is_dropped_and_the_rest_renumbered() -> None:
     before, after = merged([about_centre(0, 1e-4, 0), about_centre(0.05, 0.004, 0), np.eye(4)])
     np.testing.assert_array_equal(after, np.where(before == 1, 0, -1))
-
-
-def test_a_frame_settles_in_the_group_whose_motion_explains_it() -> None:
-    motions = [about_centre(0.1, 0.0, 0.0), about_centre(0.0, 0.006, 0.0)]
-    frames, truth = moved_frames([*motions, about_centre(0.0, -0.03, 0.02)], np.random.default_rng(4))
-    misfit = misfits(frames, np.array(motions), precision(frames))
-    assert np.median(misfit[truth == 0, 0]) == pytest.approx(1.0, abs=0.4)
-    settled = settle_groups(frames, misfit, np.ones(len(frames)), MotionParameters())
-    at_all = truth < 2
-    assert np.mean(settled[at_all] == truth[at_all]) > 0.9
-    np.testing.assert_array_equal(settled[~at_all], -1)
 
 
 def test_two_shifts_differ_by_focal_length_over_distance() -> None:

@@ -20,7 +20,8 @@ def least_energy(unary: np.ndarray, edges: np.ndarray, weight: np.ndarray) -> fl
 
 
 def found_labels(unary: np.ndarray, edges: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    return potts_labels(unary.T, PottsGraph(len(unary), edges, weight))
+    label, _ = potts_labels(unary.T.astype(np.float32), PottsGraph(len(unary), edges, weight))
+    return label
 
 
 def grid(height: int, width: int) -> np.ndarray:

@@ -63,8 +63,6 @@ def test_the_papers_own_version_runs_and_labels_what_moves(pushed) -> None:
         bfif=BFIFParameters(
             frames=BodyFrameParameters(kind="triplets"),
             grouping=GroupingParameters(covariance="sample"),
-            settling_rounds=0,
-            space_frame="camera",
         ),
         segment=SegmentParameters(outline="flow", propagation="flow", ids="fresh", memory=False),
         pairs=FramePairParameters(kind="consecutive"),
