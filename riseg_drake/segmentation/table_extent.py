@@ -69,7 +69,7 @@ def _axes(normal: NDArray) -> NDArray[np.float32]:
 
 def _feet(ray: NDArray, depth: NDArray, along: NDArray) -> NDArray[np.float32]:
     """Where on the plane, m, points stand that lie `depth` along rays: [..., 2]."""
-    return (ray @ along.T) * depth[..., None]
+    return (ray.reshape(-1, 3) @ along.T).reshape(*depth.shape, 2) * depth[..., None]
 
 
 def _largest_piece(on_table: NDArray[np.bool_]) -> NDArray[np.bool_]:
