@@ -6,6 +6,7 @@ body it lies: the motion that makes the second image agree with the first, in gr
 is found by Gauss-Newton from where the group's motion starts. Nothing of it is in the paper.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,7 +26,7 @@ _CORRELATED = 6.0
 _COST_MAX = np.float32(9)
 """Squared normalised residuals count no more than that."""
 _LOOSE_TURN, _LOOSE_SHIFT, _LOOSE_ROUNDS = 0.1, 0.01, 6
-"""rad, m and Gauss-Newton steps for a surface of which no body frame says how it moves."""
+"""rad, m and Gauss-Newton steps for a whole of which no body frame says how it moves."""
 
 
 @dataclass
@@ -47,8 +48,8 @@ class AlignmentParameters:
     same_flow: float = 0.35
     """Pixels (root mean square); motions that predict flow within that are one."""
     explained: float = 4.0
-    """Mean squared residuals (gray and depth, 2 where a motion is right) up to which the edges of a blank
-    surface are explained and need no motion of their own."""
+    """Mean squared residuals (gray and depth, 2 where a motion is right) up to which the edges of a whole are
+    explained and need no motion of their own."""
     gain_min: float = 1.0
     """By how much a motion of its own must explain them better."""
 
@@ -66,8 +67,8 @@ class EdgePixels(Immutable):
     """[N]."""
     variance: NDArray[np.float32]
     """[N], of the difference between that and where it should reappear."""
-    surface_of_piece: NDArray[np.intp]
-    """[pieces], the large blank surface that each belongs to, 0.., or -1."""
+    wholes: Sequence[NDArray[np.bool_]]
+    """[pieces] each: pieces that are likely to move as one, large blank surfaces and known objects."""
 
     def subset(self, which: NDArray[np.intp]) -> "EdgePixels":
         """Some of the pixels, by their numbers."""
@@ -77,7 +78,7 @@ class EdgePixels(Immutable):
             self.piece[which],
             self.gray[which],
             self.variance[which],
-            self.surface_of_piece,
+            self.wholes,
         )
 
 
@@ -88,7 +89,7 @@ def align_motions(
     depth_noise: float,
     parameters: AlignmentParameters,
 ) -> NDArray[np.float64]:
-    """Motions [G', 4, 4] in C0: the given ones sharpened, and those of blank surfaces that none explains.
+    """Motions [G', 4, 4] in C0: the given ones sharpened, and those of wholes that none explains.
 
     Args:
         pair: the frames of t-1 and t.
@@ -112,8 +113,8 @@ def align_motions(
         p_C0Q = edges.p_C0Q[mine] if len(mine) else edges.p_C0Q
         if all(flow_difference(p_C0Q, motion, X, focal_length) > parameters.same_flow for X in aligned):
             aligned.append(motion)
-    for surface in range(int(edges.surface_of_piece.max()) + 1):
-        mine = np.flatnonzero(edges.surface_of_piece[edges.piece] == surface)
+    for whole in edges.wholes:
+        mine = np.flatnonzero(whole[edges.piece])
         if len(mine) < parameters.members_min or cost[:, mine].mean(1).min() < parameters.explained:
             continue
         proposed = _propose(image_1, edges.subset(mine), aligned, parameters)
@@ -125,7 +126,7 @@ def align_motions(
 def _propose(
     image_1: "_Image", edges: EdgePixels, motions: list[NDArray], parameters: AlignmentParameters
 ) -> NDArray | None:
-    """A motion of one surface that explains it clearly better than the known ones do, if there is one."""
+    """A motion of one whole that explains it clearly better than the known ones do, if there is one."""
     known = sorted(
         ((float(image_1.cost(edges, X).mean()), k, X) for k, X in enumerate((np.eye(4), *motions))),
     )
@@ -139,7 +140,7 @@ def edge_pixels(
     frame: Frame,
     piece: NDArray[np.intp],
     variance: NDArray[np.float32],
-    surface_of_piece: NDArray[np.intp],
+    wholes: Sequence[NDArray[np.bool_]],
     noise: MeasurementNoise,
     pixels_max: int,
 ) -> EdgePixels:
@@ -149,7 +150,7 @@ def edge_pixels(
         frame: of t-1.
         piece: [H, W], number of each pixel's piece.
         variance: [H, W], see `gray_variance`.
-        surface_of_piece: see `EdgePixels`.
+        wholes: see `EdgePixels`.
         noise: of the images.
         pixels_max: at most so many are taken.
     """
@@ -160,7 +161,7 @@ def edge_pixels(
     surface = surface.subset(np.arange(0, len(surface), max(1, -(-len(surface) // pixels_max))))
     v, u = surface.pixel
     p_C0Q = rays(frame.intrinsics)[v, u].astype(float) * surface.depth[:, None]
-    return EdgePixels(surface, p_C0Q, piece[v, u], frame.gray[v, u], variance[v, u], surface_of_piece)
+    return EdgePixels(surface, p_C0Q, piece[v, u], frame.gray[v, u], variance[v, u], wholes)
 
 
 class _Image:

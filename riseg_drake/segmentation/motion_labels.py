@@ -6,6 +6,7 @@ images best, in gray value and in depth. Pieces of the image that have no textur
 decided by their edges, and borders between labels follow edges of colour and height.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import cv2
@@ -46,6 +47,9 @@ class MotionLabelParameters:
     alignment: AlignmentParameters = field(default_factory=AlignmentParameters)
     gain_min: float = 0.25
     """A motion must explain the pixels it wins so much better, on average, than any single other one."""
+    split_gain: float = 0.25
+    """Several motions must explain an object that has moved as one before so much better, on average, than
+    the best single one."""
 
 
 @dataclass(frozen=True)
@@ -70,12 +74,26 @@ class ReferencePieces(Immutable):
     """[N], of the difference between that and where it should reappear."""
     edges: EdgePixels
     """What sharpens the motions."""
+    known: Sequence[NDArray[np.bool_]]
+    """[number of pieces] each: the pieces of objects that have moved as one before."""
 
 
 def cut_pieces(
-    reference: Frame, above_0: AboveTable, noise: MeasurementNoise, parameters: MotionLabelParameters
+    reference: Frame,
+    above_0: AboveTable,
+    known: NDArray[np.uint16],
+    noise: MeasurementNoise,
+    parameters: MotionLabelParameters,
 ) -> ReferencePieces:
-    """The pieces of the reference frame that decide as one, in the region of all that stands there."""
+    """The pieces of the reference frame that decide as one, in the region of all that stands there.
+
+    Args:
+        reference: the frame.
+        above_0: what stands on the table there.
+        known: [H, W], ids of the objects that have moved as one before, 0 elsewhere.
+        noise: of the images.
+        parameters: see there.
+    """
     region = bounding_region(above_0.mask)
     size = max(3, round(parameters.piece * above_0.pixels_per_metre(reference.intrinsics)))
     pieces = superpixels(reference.color[region], above_0.height[region], above_0.mask[region], size)
@@ -87,6 +105,9 @@ def cut_pieces(
     v, u = witnesses.pixel
     area_min = parameters.surface_min * above_0.pixels_per_metre(reference.intrinsics) ** 2
     variance = gray_variance(reference.gray, noise)
+    surface = blank_surfaces(pieces, area_min)
+    surfaces = [surface == number for number in range(int(surface.max(initial=-1)) + 1)]
+    objects = _pieces_of(known[region], pieces)
     return ReferencePieces(
         region=region,
         pieces=pieces,
@@ -100,10 +121,19 @@ def cut_pieces(
         piece=whole[v, u],
         gray=reference.gray[v, u],
         variance=variance[v, u],
-        edges=edge_pixels(
-            reference, whole, variance, blank_surfaces(pieces, area_min), noise, parameters.alignment.pixels
-        ),
+        edges=edge_pixels(reference, whole, variance, surfaces + objects, noise, parameters.alignment.pixels),
+        known=objects,
     )
+
+
+def _pieces_of(label: NDArray[np.uint16], pieces: Superpixels) -> list[NDArray[np.bool_]]:
+    """For each id in a label image [H, W], the pieces [N] that it has most of."""
+    ids, number = np.unique(label, return_inverse=True)
+    inside = pieces.label >= 0
+    code = pieces.label[inside] * len(ids) + number.reshape(label.shape)[inside]
+    votes = np.bincount(code, minlength=pieces.count * len(ids)).reshape(pieces.count, len(ids))
+    winner = ids[votes.argmax(1)]
+    return [winner == a for a in ids if a > 0]
 
 
 def label_by_motion(
@@ -130,6 +160,7 @@ def label_by_motion(
     sums = np.array([np.bincount(pieces.piece, c, count) for c in cost], np.float32)
     unary = sums / np.float32(parameters.correlated_pixels)
     label = _fewest_labels(unary, pieces, parameters)
+    _keep_whole(label, unary, pieces, parameters)
     out = np.zeros(pair.reference.depth.shape, np.int16)
     # The last entry is for what is in no piece, whose number is -1.
     out[pieces.region] = np.append(label, 0)[pieces.pieces.label]
@@ -163,6 +194,21 @@ def _fewest_labels(
         del needed[dropped]
         # The others' messages are a good start.
         message = np.delete(message, dropped, axis=0)
+
+
+def _keep_whole(
+    label: NDArray[np.intp],
+    unary: NDArray[np.float32],
+    pieces: ReferencePieces,
+    parameters: MotionLabelParameters,
+) -> None:
+    """Give each known object to one motion, in place, unless several explain it clearly better."""
+    for mine in pieces.known:
+        if len(set(label[mine])) > 1:
+            sums = unary[:, mine].sum(1)
+            gain = sums.min() - unary[label[mine], np.flatnonzero(mine)].sum()
+            if gain * parameters.correlated_pixels < parameters.split_gain * pieces.area[mine].sum():
+                label[mine] = sums.argmin()
 
 
 def motion_costs(

@@ -161,7 +161,9 @@ def segment(
     )
     if len(motions) and above_0.mask.any():
         if parameters.outline == "motion" and now.pieces is None:
-            pieces = cut_pieces(pair.reference, above_0, parameters.noise, parameters.labels)
+            pieces = cut_pieces(
+                pair.reference, above_0, _moved_as_one(now), parameters.noise, parameters.labels
+            )
             now = replace(now, pieces=pieces)
         if now.pieces is not None:
             motions = align_motions(
@@ -218,6 +220,13 @@ def _renew_reference(
         motion_of={},
         memory=memory,
     )
+
+
+def _moved_as_one(now: Segmentation) -> NDArray[np.uint16]:
+    """L_t-1 [H, W] without what was found in this episode of motion only, or is in doubt."""
+    earlier = [a for a, episode in now.born.items() if episode < now.episode and a not in now.doubtful]
+    label = now.known.label
+    return np.where(np.isin(label, earlier), label, np.uint16(0))
 
 
 def _grow(

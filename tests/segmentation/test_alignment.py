@@ -56,7 +56,13 @@ class Moved:
             label_0[1::4, 1::4],
         )
         above_0 = standing(self.pair.reference, label_0 > 0)
-        pieces = cut_pieces(self.pair.reference, above_0, MeasurementNoise(), MotionLabelParameters())
+        pieces = cut_pieces(
+            self.pair.reference,
+            above_0,
+            np.zeros_like(above_0.mask, np.uint16),
+            MeasurementNoise(),
+            MotionLabelParameters(),
+        )
         self.edges = pieces.edges
         self.motion_C0 = motion_seen_from(CAMERAS[0], PLACES[0], after[0])
         v, u = self.edges.surface.pixel

@@ -1,6 +1,5 @@
 """Lines 3 to 6 of Alg. 2 on rendered bodies whose motions are known."""
 
-
 import numpy as np
 import pytest
 
