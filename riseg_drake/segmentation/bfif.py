@@ -13,7 +13,7 @@ from riseg_drake.segmentation.body_frames import (
     BodyFrames,
     sample_body_frames,
 )
-from riseg_drake.segmentation.effective_flow import MovingParameters, moving_pixels
+from riseg_drake.segmentation.effective_flow import MovingParameters, effective_flow, moving_pixels
 from riseg_drake.segmentation.grouping import GroupingParameters, group_twists
 from riseg_drake.segmentation.motions import (
     BFIFGroups,
@@ -65,13 +65,15 @@ def group_body_frames(
     moving = moving_pixels(pair, expected_flow, optical_flow, above_0, noise, parameters.moving)
     if not moving.any():
         return no_groups()
+    X_t = effective_flow(optical_flow[moving], expected_flow[moving])
+    moved = float(np.median(np.linalg.norm(X_t, axis=-1)))
     region = bounding_region(moving, margin=16)
     sigma = np.full(moving.shape, np.inf, np.float32)
     sigma[region] = flow_sigma(pair.reference.gray[region], noise)
     trusted = moving & (sigma <= noise.flow_max)
     frames = sample_body_frames(pair, optical_flow, trusted, sigma, parameters.frames, rng)
     if len(frames) < parameters.grouping.members_min:
-        return no_groups()
+        return no_groups(moved)
     normal_C0 = pair.reference.X_WC[:3, :3].T @ above_0.plane_W[:3]
     prior = sliding_prior(normal_C0, parameters.motions.tilt, parameters.motions.lift)
     precision = point_precision(
@@ -95,7 +97,7 @@ def group_body_frames(
         group=group,
         motion_C0=motions,
         p_C0Q=seeds,
-        flow_span=max(spans, default=0.0),
+        flow_span=max(spans, default=moved),
     )
 
 
@@ -107,8 +109,8 @@ def _on_one_body(twists: Twists, misfit_max: float) -> NDArray[np.bool_]:
     return twists.misfit <= misfit_max * max(1.0, float(np.median(twists.misfit)))
 
 
-def no_groups() -> BFIFGroups:
-    """G_t where nothing moves."""
+def no_groups(flow_span: float = 0.0) -> BFIFGroups:
+    """G_t where nothing moves, or where no body frame can say how."""
     return BFIFGroups(
         pixel=np.empty((0, 2), np.intp),
         V_S=np.empty((0, 6)),
@@ -117,7 +119,7 @@ def no_groups() -> BFIFGroups:
         group=np.empty(0, np.intp),
         motion_C0=np.empty((0, 4, 4)),
         p_C0Q=np.empty((0, 3)),
-        flow_span=0.0,
+        flow_span=flow_span,
     )
 
 

@@ -48,8 +48,8 @@ class MotionLabelParameters:
     gain_min: float = 0.25
     """A motion must explain the pixels it wins so much better, on average, than any single other one."""
     split_gain: float = 0.25
-    """Several motions must explain an object that has moved as one before so much better, on average, than
-    the best single one."""
+    """Several motions must explain a blank surface, or an object that has moved as one before, so much better,
+    on average, than the best single one."""
 
 
 @dataclass(frozen=True)
@@ -74,8 +74,6 @@ class ReferencePieces(Immutable):
     """[N], of the difference between that and where it should reappear."""
     edges: EdgePixels
     """What sharpens the motions."""
-    known: Sequence[NDArray[np.bool_]]
-    """[number of pieces] each: the pieces of objects that have moved as one before."""
 
 
 def cut_pieces(
@@ -122,7 +120,6 @@ def cut_pieces(
         gray=reference.gray[v, u],
         variance=variance[v, u],
         edges=edge_pixels(reference, whole, variance, surfaces + objects, noise, parameters.alignment.pixels),
-        known=objects,
     )
 
 
@@ -202,8 +199,8 @@ def _keep_whole(
     pieces: ReferencePieces,
     parameters: MotionLabelParameters,
 ) -> None:
-    """Give each known object to one motion, in place, unless several explain it clearly better."""
-    for mine in pieces.known:
+    """Give each whole to one motion, in place, unless several explain it clearly better."""
+    for mine in pieces.edges.wholes:
         if len(set(label[mine])) > 1:
             sums = unary[:, mine].sum(1)
             gain = sums.min() - unary[label[mine], np.flatnonzero(mine)].sum()

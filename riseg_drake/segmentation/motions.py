@@ -55,7 +55,8 @@ class BFIFGroups(Immutable):
     p_C0Q: NDArray[np.float64]
     """[K, 3], the seeds' points at t-1, m."""
     flow_span: float
-    """Effective flow of the fastest group (root mean square over its frames), pixels; 0 if none."""
+    """Effective flow of the fastest group (root mean square over its frames), pixels. Where there is no
+    group, the median over what moves, which a body without texture does too; 0 if nothing moves."""
 
     def __len__(self) -> int:
         """The number of groups G."""

@@ -153,13 +153,13 @@ def segment(
     if before.sequence == pair.current.sequence:
         return before
     now = _renew_reference(before, pair, above_0, parameters)
-    if len(groups):
+    if groups.flow_span > 0:
         starts = pair.current.time - before.last_motion > parameters.episode_gap
         now = replace(now, last_motion=pair.current.time, episode=now.episode + int(starts))
     motions = with_earlier_motions(
         groups, now.motion_of.values(), pair.current.intrinsics.fx, parameters.motions
     )
-    if len(motions) and above_0.mask.any():
+    if (len(motions) or groups.flow_span > 0) and above_0.mask.any():
         if parameters.outline == "motion" and now.pieces is None:
             pieces = cut_pieces(
                 pair.reference, above_0, _moved_as_one(now), parameters.noise, parameters.labels
@@ -173,6 +173,7 @@ def segment(
                 above_0.depth_noise,
                 parameters.labels.alignment,
             )
+    if len(motions):
         moving = _grow(now, pair, expected_flow, optical_flow, groups, motions, above_0, parameters)
         now = _decide(now, pair, groups, motions, moving, above_0, parameters)
     if parameters.propagation == "flow":
