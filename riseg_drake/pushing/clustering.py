@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 from sklearn.cluster import KMeans, MeanShift
+from threadpoolctl import threadpool_limits
 
 
 @dataclass
@@ -117,7 +118,9 @@ def _k_means(
 ) -> tuple[NDArray[np.float64], float]:
     """Centers [k, 2] and inertia (MacQueen 1967, with k-means++ starts)."""
     seed = int(rng.integers(2**31))
-    fit = KMeans(n_clusters=k, n_init=restarts, max_iter=60, random_state=seed).fit(points)
+    # Several threads would share the sums, which then come out differently in their last bits.
+    with threadpool_limits(1):
+        fit = KMeans(n_clusters=k, n_init=restarts, max_iter=60, random_state=seed).fit(points)
     return fit.cluster_centers_, float(fit.inertia_)
 
 

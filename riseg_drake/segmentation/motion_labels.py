@@ -6,7 +6,6 @@ images best, in gray value and in depth. Pieces of the image that have no textur
 decided by their edges, and borders between labels follow edges of colour and height.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import cv2

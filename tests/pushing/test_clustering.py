@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from riseg_drake.pushing.clustering import METHODS, ClusteringParameters, clusterings, elbow
 
@@ -67,3 +68,14 @@ def test_single_point_is_a_cluster():
 def test_unknown_method_is_an_error_that_names_the_known_ones():
     with pytest.raises(ValueError, match="k-medoids"):
         next(clusterings(np.zeros((1, 2)), ClusteringParameters(method="x"), np.random.default_rng(0)))
+
+
+def test_the_clusters_are_the_same_to_the_last_bit_whatever_the_number_of_threads():
+    points = blobs(5, np.random.default_rng(0))
+    answers = []
+    for threads in (1, 2):
+        with threadpool_limits(threads):
+            rng = np.random.default_rng(1)
+            answers.append([c.centers for c in clusterings(points, ClusteringParameters(), rng)])
+    for one, two in zip(*answers, strict=True):
+        np.testing.assert_array_equal(one, two)
