@@ -9,10 +9,11 @@ is found by Gauss-Newton from where the group's motion starts. Nothing of it is 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import rays
+from riseg_drake.geometry.camera import Intrinsics, rays
 from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
 from riseg_drake.geometry.se3 import exp_se3, move_points, translation
 from riseg_drake.segmentation.motions import flow_difference
@@ -25,6 +26,8 @@ _CORRELATED = 6.0
 """Noise of depth is correlated over about so many pixels; they count as one."""
 _COST_MAX = np.float32(9)
 """Squared normalised residuals count no more than that."""
+_FAR_BLUR = 4.0
+"""Pixels by which both images are blurred to find a motion from afar."""
 _LOOSE_TURN, _LOOSE_SHIFT, _LOOSE_ROUNDS = 0.1, 0.01, 6
 """rad, m and Gauss-Newton steps for a whole of which no body frame says how it moves."""
 
@@ -100,8 +103,8 @@ def align_motions(
     """
     if not len(edges.piece) or parameters.rounds == 0:
         return motions
-    image_1 = _Image(pair, depth_noise)
-    cost = np.array([image_1.cost(edges, motion) for motion in (np.eye(4), *motions)])
+    image_1 = _image(pair, depth_noise)
+    cost = edge_costs(pair, edges, motions, depth_noise)
     pieces = int(edges.piece.max()) + 1
     owner = np.argmin([np.bincount(edges.piece, c, pieces) for c in cost], axis=0)[edges.piece]
     focal_length = pair.current.intrinsics.fx
@@ -117,46 +120,68 @@ def align_motions(
         mine = np.flatnonzero(whole[edges.piece])
         if len(mine) < parameters.members_min or cost[:, mine].mean(1).min() < parameters.explained:
             continue
-        proposed = _propose(image_1, edges.subset(mine), aligned, parameters)
+        proposed = _propose(pair, image_1, edges.subset(mine), aligned, parameters)
         if proposed is not None:
             aligned.append(proposed)
     return np.array(aligned).reshape(-1, 4, 4)
 
 
+def edge_costs(
+    pair: FramePair, edges: EdgePixels, motions: NDArray[np.float64], depth_noise: float
+) -> NDArray[np.float32]:
+    """How badly standing still and each motion [G, 4, 4] explain each edge pixel, [1 + G, N]: 2 where it is
+    right, 18 at most."""
+    image_1 = _image(pair, depth_noise)
+    return np.array([image_1.cost(edges, motion) for motion in (np.eye(4), *motions)])
+
+
 def _propose(
-    image_1: "_Image", edges: EdgePixels, motions: list[NDArray], parameters: AlignmentParameters
+    pair: FramePair,
+    image_1: "_Image",
+    edges: EdgePixels,
+    motions: list[NDArray],
+    parameters: AlignmentParameters,
 ) -> NDArray | None:
     """A motion of one whole that explains it clearly better than the known ones do, if there is one."""
     known = sorted(
         ((float(image_1.cost(edges, X).mean()), k, X) for k, X in enumerate((np.eye(4), *motions))),
     )
     loose = replace(parameters, turn=_LOOSE_TURN, shift=_LOOSE_SHIFT)
-    proposals = [image_1.align(edges, X, _LOOSE_ROUNDS, loose) for _, _, X in known[:3]]
+    # An edge is sharp: it leads nowhere from more than two pixels away. Blurred, it is seen from afar.
+    blurred_0, blurred_1 = (_blurred(gray) for gray in (pair.reference.gray, pair.current.unhidden_gray))
+    far_image = replace(image_1, gray=blurred_1)
+    v, u = edges.surface.pixel
+    far_edges = replace(edges, gray=blurred_0[v, u])
+    proposals = []
+    for _, _, X in known[:3]:
+        nearer, _ = far_image.align(far_edges, X, _LOOSE_ROUNDS, loose)
+        proposals += [image_1.align(edges, start, _LOOSE_ROUNDS, loose) for start in (X, nearer)]
     motion, cost = min(proposals, key=lambda proposal: proposal[1])
     return motion if cost < known[0][0] - parameters.gain_min else None
+
+
+def _blurred(gray: NDArray[np.float32]) -> NDArray[np.float32]:
+    return cv2.GaussianBlur(gray, (0, 0), _FAR_BLUR)
 
 
 def edge_pixels(
     frame: Frame,
     piece: NDArray[np.intp],
+    contrast: NDArray[np.bool_],
     variance: NDArray[np.float32],
     wholes: Sequence[NDArray[np.bool_]],
-    noise: MeasurementNoise,
     pixels_max: int,
 ) -> EdgePixels:
-    """Evenly taken pixels of the pieces [H, W] (-1 = none) that have more gradient than noise has.
+    """Evenly taken pixels with contrast of the pieces [H, W] (-1 = none).
 
     Args:
         frame: of t-1.
         piece: [H, W], number of each pixel's piece.
+        contrast: [H, W], see `has_contrast`.
         variance: [H, W], see `gray_variance`.
         wholes: see `EdgePixels`.
-        noise: of the images.
         pixels_max: at most so many are taken.
     """
-    contrast = (
-        variance - np.float32(2 * noise.color**2) > noise.registration**2 * _GRADIENT_MIN * noise.color**2
-    )
     surface = surface_pixels((piece >= 0) & contrast, frame.depth, frame.intrinsics)
     surface = surface.subset(np.arange(0, len(surface), max(1, -(-len(surface) // pixels_max))))
     v, u = surface.pixel
@@ -164,13 +189,28 @@ def edge_pixels(
     return EdgePixels(surface, p_C0Q, piece[v, u], frame.gray[v, u], variance[v, u], wholes)
 
 
+def has_contrast(variance: NDArray[np.float32], noise: MeasurementNoise) -> NDArray[np.bool_]:
+    """Which pixels, by their `gray_variance`, have more gradient than noise has: they tell where they are."""
+    least = noise.registration**2 * _GRADIENT_MIN * noise.color**2
+    return variance - np.float32(2 * noise.color**2) > least
+
+
+def _image(pair: FramePair, depth_noise: float) -> "_Image":
+    current = pair.current
+    noise = float(np.sqrt(2)) * depth_noise
+    return _Image(pair.X_C1C0, current.intrinsics, current.unhidden_gray, current.unhidden_depth, noise)
+
+
+@dataclass(frozen=True)
 class _Image:
     """The frame of t: what pixels of t-1 find there."""
 
-    def __init__(self, pair: FramePair, depth_noise: float) -> None:
-        self.X_C1C0, self.intrinsics = pair.X_C1C0, pair.current.intrinsics
-        self.gray, self.depth = pair.current.unhidden_gray, pair.current.unhidden_depth
-        self.depth_noise = float(np.sqrt(2)) * depth_noise
+    X_C1C0: NDArray[np.float64]
+    intrinsics: Intrinsics
+    gray: NDArray[np.float32]
+    depth: NDArray[np.float32]
+    depth_noise: float
+    """Of the difference of two depths at 1 m, m."""
 
     def cost(self, edges: EdgePixels, motion: NDArray) -> NDArray[np.float32]:
         """How badly a motion explains each pixel [N]: 2 where it is right, 18 at most."""

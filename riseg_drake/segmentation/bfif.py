@@ -65,15 +65,13 @@ def group_body_frames(
     moving = moving_pixels(pair, expected_flow, optical_flow, above_0, noise, parameters.moving)
     if not moving.any():
         return no_groups()
-    X_t = effective_flow(optical_flow[moving], expected_flow[moving])
-    moved = float(np.median(np.linalg.norm(X_t, axis=-1)))
     region = bounding_region(moving, margin=16)
     sigma = np.full(moving.shape, np.inf, np.float32)
     sigma[region] = flow_sigma(pair.reference.gray[region], noise)
     trusted = moving & (sigma <= noise.flow_max)
     frames = sample_body_frames(pair, optical_flow, trusted, sigma, parameters.frames, rng)
     if len(frames) < parameters.grouping.members_min:
-        return no_groups(moved)
+        return no_groups(_median_length(optical_flow, expected_flow, moving))
     normal_C0 = pair.reference.X_WC[:3, :3].T @ above_0.plane_W[:3]
     prior = sliding_prior(normal_C0, parameters.motions.tilt, parameters.motions.lift)
     precision = point_precision(
@@ -89,6 +87,7 @@ def group_body_frames(
         group, motions = joined, group_motions(frames, joined, precision, prior)
     seeds = frames.p_C0Q0[:, 0]
     spans = [flow_difference(seeds[group == g], X, np.eye(4), focal_length) for g, X in enumerate(motions)]
+    flow_span = max(spans) if spans else _median_length(optical_flow, expected_flow, moving)
     return BFIFGroups(
         pixel=frames.pixel,
         V_S=twists.V_S,
@@ -97,8 +96,16 @@ def group_body_frames(
         group=group,
         motion_C0=motions,
         p_C0Q=seeds,
-        flow_span=max(spans, default=moved),
+        flow_span=flow_span,
     )
+
+
+def _median_length(
+    optical_flow: NDArray[np.float32], expected_flow: NDArray[np.float32], moving: NDArray[np.bool_]
+) -> float:
+    """||X_t|| of what moves, pixels."""
+    X_t = effective_flow(optical_flow[moving], expected_flow[moving])
+    return float(np.median(np.linalg.norm(X_t, axis=-1)))
 
 
 def _on_one_body(twists: Twists, misfit_max: float) -> NDArray[np.bool_]:

@@ -15,7 +15,13 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.camera import Region, bounding_region
 from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
 from riseg_drake.segmentation.above_table import AboveTable
-from riseg_drake.segmentation.alignment import AlignmentParameters, EdgePixels, edge_pixels
+from riseg_drake.segmentation.alignment import (
+    AlignmentParameters,
+    EdgePixels,
+    edge_costs,
+    edge_pixels,
+    has_contrast,
+)
 from riseg_drake.segmentation.noise import MeasurementNoise, depth_sigma, gray_variance
 from riseg_drake.segmentation.potts import PottsGraph, potts_labels
 from riseg_drake.segmentation.superpixels import Superpixels, blank_surfaces, superpixels
@@ -46,9 +52,11 @@ class MotionLabelParameters:
     alignment: AlignmentParameters = field(default_factory=AlignmentParameters)
     gain_min: float = 0.25
     """A motion must explain the pixels it wins so much better, on average, than any single other one."""
-    split_gain: float = 0.25
-    """Several motions must explain a blank surface, or an object that has moved as one before, so much better,
-    on average, than the best single one."""
+    whole_max: float = 5.0
+    """A blank surface, or an object that has moved as one before, goes to a single motion whole if the mean
+    squared residuals of its edges (gray and depth, 2 where a motion is right) are less than that,"""
+    split_gain: float = 1.0
+    """and if several motions do not explain them so much better."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +72,7 @@ class ReferencePieces(Immutable):
     graph: PottsGraph
     """Which pieces are neighbours, and what different labels on both sides cost."""
     witnesses: SurfacePixels
-    """The pixels that can tell motions apart: with depth, and not on the rim."""
+    """The pixels that are asked: with depth, and not on the rim."""
     piece: NDArray[np.intp]
     """[N], of each witness."""
     gray: NDArray[np.float32]
@@ -96,15 +104,17 @@ def cut_pieces(
     pieces = superpixels(reference.color[region], above_0.height[region], above_0.mask[region], size)
     whole = np.full(above_0.mask.shape, -1, np.intp)
     whole[region] = pieces.label
+    variance = gray_variance(reference.gray, noise)
+    contrast = has_contrast(variance, noise)
+    surface = blank_surfaces(
+        pieces, parameters.surface_min * above_0.pixels_per_metre(reference.intrinsics) ** 2
+    )
+    wholes = [surface == number for number in range(int(surface.max(initial=-1)) + 1)]
+    wholes += _pieces_of(known[region], pieces)
     # On the rim a pixel sees half of what is behind it: no motion explains that, least of all the right one.
     core = cv2.erode((whole >= 0).astype(np.uint8), _RIM, borderValue=0) > 0
     witnesses = surface_pixels(core, reference.depth, reference.intrinsics)
     v, u = witnesses.pixel
-    area_min = parameters.surface_min * above_0.pixels_per_metre(reference.intrinsics) ** 2
-    variance = gray_variance(reference.gray, noise)
-    surface = blank_surfaces(pieces, area_min)
-    surfaces = [surface == number for number in range(int(surface.max(initial=-1)) + 1)]
-    objects = _pieces_of(known[region], pieces)
     return ReferencePieces(
         region=region,
         pieces=pieces,
@@ -118,7 +128,7 @@ def cut_pieces(
         piece=whole[v, u],
         gray=reference.gray[v, u],
         variance=variance[v, u],
-        edges=edge_pixels(reference, whole, variance, surfaces + objects, noise, parameters.alignment.pixels),
+        edges=edge_pixels(reference, whole, contrast, variance, wholes, parameters.alignment.pixels),
     )
 
 
@@ -156,7 +166,7 @@ def label_by_motion(
     sums = np.array([np.bincount(pieces.piece, c, count) for c in cost], np.float32)
     unary = sums / np.float32(parameters.correlated_pixels)
     label = _fewest_labels(unary, pieces, parameters)
-    _keep_whole(label, unary, pieces, parameters)
+    _keep_whole(label, edge_costs(pair, pieces.edges, motions, depth_noise), pieces.edges, parameters)
     out = np.zeros(pair.reference.depth.shape, np.int16)
     # The last entry is for what is in no piece, whose number is -1.
     out[pieces.region] = np.append(label, 0)[pieces.pieces.label]
@@ -194,17 +204,19 @@ def _fewest_labels(
 
 def _keep_whole(
     label: NDArray[np.intp],
-    unary: NDArray[np.float32],
-    pieces: ReferencePieces,
+    edge_cost: NDArray[np.float32],
+    edges: EdgePixels,
     parameters: MotionLabelParameters,
 ) -> None:
-    """Give each whole to one motion, in place, unless several explain it clearly better."""
-    for mine in pieces.edges.wholes:
-        if len(set(label[mine])) > 1:
-            sums = unary[:, mine].sum(1)
-            gain = sums.min() - unary[label[mine], np.flatnonzero(mine)].sum()
-            if gain * parameters.correlated_pixels < parameters.split_gain * pieces.area[mine].sum():
-                label[mine] = sums.argmin()
+    """Give each whole to one motion, in place, where one explains its edges as well as several do."""
+    for mine in edges.wholes:
+        on = np.flatnonzero(mine[edges.piece])
+        if len(on) < parameters.alignment.members_min:
+            continue
+        single = edge_cost[:, on].mean(1)
+        several = edge_cost[label[edges.piece[on]], on].mean()
+        if single.min() < min(parameters.whole_max, several + parameters.split_gain):
+            label[mine] = single.argmin()
 
 
 def motion_costs(

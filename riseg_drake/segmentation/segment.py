@@ -159,7 +159,8 @@ def segment(
     motions = with_earlier_motions(
         groups, now.motion_of.values(), pair.current.intrinsics.fx, parameters.motions
     )
-    if (len(motions) or groups.flow_span > 0) and above_0.mask.any():
+    something_stands = above_0.mask.any()
+    if something_stands and (len(motions) or groups.flow_span > 0):
         if parameters.outline == "motion" and now.pieces is None:
             pieces = cut_pieces(
                 pair.reference, above_0, _moved_as_one(now), parameters.noise, parameters.labels
@@ -173,7 +174,7 @@ def segment(
                 above_0.depth_noise,
                 parameters.labels.alignment,
             )
-    if len(motions):
+    if something_stands and len(motions):
         moving = _grow(now, pair, expected_flow, optical_flow, groups, motions, above_0, parameters)
         now = _decide(now, pair, groups, motions, moving, above_0, parameters)
     if parameters.propagation == "flow":
