@@ -20,7 +20,7 @@ class BodyFrameParameters:
 
     kind: str = field(default="patches", metadata={"choices": ("patches", "triplets")})
     """"patches" (least squares over many points) or "triplets" (three points, as in the paper)."""
-    count: int = 100
+    count: int = 80
     """How many body frames; the paper's n counts sampled pixels and is not given."""
     diameter: float = 0.024
     """d_a, m: no two points of one frame are further apart; not given in the paper."""

@@ -85,10 +85,10 @@ def nearest_label(label: NDArray[np.uint16], inside: NDArray[np.bool_], reach: f
         distance, index = cv2.distanceTransformWithLabels(
             (old == 0).astype(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
         )
+        known, near = np.flatnonzero(old), np.flatnonzero(empty & (distance <= reach))
         value = np.zeros(index.max() + 1, np.uint16)
-        value[index[old > 0]] = old[old > 0]
-        near = empty & (distance <= reach)
-        filled[near] = value[index[near]]
+        value[index.ravel()[known]] = old.ravel()[known]
+        filled.ravel()[near] = value[index.ravel()[near]]
     out[region] = filled
     return out
 
