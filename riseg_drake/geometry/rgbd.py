@@ -42,11 +42,15 @@ class Frame(Immutable):
     """Pose of the camera, [4, 4], by forward kinematics from theta_t (or as recorded)."""
     robot: NDArray[np.bool_]
     """[H, W], the pixels that the robot itself covers."""
+    gain: float = 1.0
+    """What gray values are multiplied with, so that frames of different exposure can be compared."""
 
     @cached_property
     def gray(self) -> NDArray[np.float32]:
-        """Gray values [H, W], 0..255, as `smooth_gray` makes them; worked out once for all stages."""
-        return smooth_gray(self.color)
+        """Gray values [H, W], 0..255 times the gain, as `smooth_gray` makes them; worked out once for all
+        stages."""
+        gray = smooth_gray(self.color)
+        return gray if self.gain == 1 else gray * np.float32(self.gain)
 
     @cached_property
     def unhidden_gray(self) -> NDArray[np.float32]:

@@ -9,6 +9,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
 from riseg_drake.geometry.rgbd import FramePair, Immutable
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.camera_motion import CameraMotionParameters, PoseError, renewed_pose_error
+from riseg_drake.segmentation.exposure import with_equal_exposure
 from riseg_drake.segmentation.frame_pairs import FramePairParameters, next_pair
 
 
@@ -77,7 +78,8 @@ class FramePairMemory(LeafSystem):
         else:
             flow_span = float(self._flow_span.Eval(context)[0])
             frame = replace(frame, sequence=memory.pair.current.sequence + 1)
-            pair = next_pair(memory.pair, frame, flow_span, self._parameters)
+            pair = with_equal_exposure(next_pair(memory.pair, frame, flow_span, self._parameters))
+            frame = pair.current
             above_0 = memory.above_0 if pair.reference is memory.pair.reference else memory.above_1
             error = renewed_pose_error(
                 memory.pose_error, memory.pair.current, memory.above_1, frame, above, self._camera_motion

@@ -1,5 +1,8 @@
 """Drawn objects that move by known motions before a camera at rest; poses that err where nothing moves."""
 
+from dataclasses import replace
+
+import cv2
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -40,6 +43,64 @@ def test_each_object_that_moves_is_found_with_overlap_f_above_85(speed, frames, 
     truth = np.where(np.isin(film_frame.labels, list(twists)), film_frame.labels, 0)
     scores = score(mask, truth)
     assert scores.objects_found == 2
+    assert scores.overlap_f >= 0.85
+
+
+def automatic_exposure(frame: RecordedFrame, rng: np.random.Generator) -> RecordedFrame:
+    """Brighter and darker by a sixth, once a second."""
+    factor = 1 + np.sin(2 * np.pi * frame.time) / 6
+    return replace(frame, color=np.clip(np.rint(frame.color * factor), 0, 255).astype(np.uint8))
+
+
+def flying_pixels(frame: RecordedFrame, rng: np.random.Generator) -> RecordedFrame:
+    """Half the pixels at a step in depth lie anywhere between its front and its back."""
+    window = np.ones((3, 3), np.uint8)
+    front, back = cv2.erode(frame.depth, window), cv2.dilate(frame.depth, window)
+    flying = (front > 0) & (back - front > 0.01) & (rng.random(front.shape) < 0.5)
+    between = front + (back - front) * rng.random(front.shape)
+    return replace(frame, depth=np.where(flying, between, frame.depth).astype(np.float32))
+
+
+def holes(frame: RecordedFrame, rng: np.random.Generator) -> RecordedFrame:
+    """A twentieth of the depth is missing, in specks."""
+    specks = cv2.GaussianBlur(rng.normal(size=frame.depth.shape), (0, 0), 1.5)
+    return replace(frame, depth=np.where(specks > np.quantile(specks, 0.95), 0, frame.depth).astype(np.float32))
+
+
+@pytest.mark.parametrize("fault", [automatic_exposure, flying_pixels, holes])
+@pytest.mark.parametrize("moves", [True, False], ids=["moving", "still"])
+def test_faults_of_real_sensors_are_no_motion_and_hide_none(fault, moves) -> None:
+    scene = DrawnScene(SIZES, table=Texture(9, contrast=8))
+    frame, labels = scene.frame(0, looking_down(), PLACES, np.random.default_rng(0))
+    z = float(np.median(frame.depth[labels == 1]))
+    twists = {1: sideways(np.array((-1.4, 0.6)), z, CAMERA, 0.005)} if moves else {}
+    replay = Replay(Scenario(), FrameView(CAMERA, None, None), seed=0)
+    film = moved_film(frame.color, frame.depth, labels, CAMERA, twists, 14, np.random.default_rng(1))
+    rng = np.random.default_rng(2)
+    for film_frame in film:
+        mask = replay.mask_after(fault(film_frame, rng))
+    scores = score(mask, np.where(np.isin(film_frame.labels, list(twists)), film_frame.labels, 0))
+    if moves:
+        assert scores.objects_found == 1
+        assert scores.overlap_f >= 0.85
+    else:
+        assert replay.segmentation.object_ids == ()
+
+
+@pytest.mark.parametrize("size", [(848, 480), (1280, 720)], ids=["848x480", "1280x720"])
+def test_an_object_is_found_in_the_larger_formats_of_real_cameras(size) -> None:
+    width, height = size
+    intrinsics = Intrinsics(width, height, 0.72 * width, 0.72 * width, width / 2 - 3, height / 2 + 2)
+    frame, labels = DrawnScene(SIZES, intrinsics=intrinsics).frame(
+        0, looking_down(), PLACES, np.random.default_rng(0)
+    )
+    twists = {3: sideways(np.array((1.0, 3.0)), float(np.median(frame.depth[labels == 3])), intrinsics, 0.005)}
+    replay = Replay(Scenario(), FrameView(intrinsics, None, None), seed=0)
+    film = moved_film(frame.color, frame.depth, labels, intrinsics, twists, 8, np.random.default_rng(1))
+    for film_frame in film:
+        mask = replay.mask_after(film_frame)
+    scores = score(mask, np.where(film_frame.labels == 3, film_frame.labels, 0))
+    assert scores.objects_found == 1
     assert scores.overlap_f >= 0.85
 
 
