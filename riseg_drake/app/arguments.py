@@ -209,6 +209,9 @@ def command_line() -> argparse.ArgumentParser:
         metavar="SECONDS",
         help="measure instead how evenly commands for a real arm are sent beside the segmentation",
     )
+    bench.add_argument(
+        "--stops", action="store_true", help="measure instead how soon a moving arm stands still, over LCM"
+    )
     bench.add_argument("--raft", action="store_true", help="measure RAFT instead, small and large")
 
     diagram = _add(

@@ -101,6 +101,10 @@ def bench(chosen: argparse.Namespace, console: Console) -> None:
         from riseg_drake.app.raft_bench import raft_bench_command
 
         return raft_bench_command(chosen.scenario, console)
+    if chosen.stops:
+        from riseg_drake.app.stop_bench import bench_stops
+
+        return bench_stops(console)
     from riseg_drake.app.bench import bench_command
 
     bench_command(chosen.scenario, chosen.seed, chosen.stream, console)

@@ -4,9 +4,7 @@ import threading
 import time
 
 import numpy as np
-from drake import lcmt_panda_status
 from numpy.typing import NDArray
-from pydrake.lcm import DrakeLcm
 from rich.console import Console
 
 from riseg_drake.app.bench import StationOutputs, segment_once
@@ -16,6 +14,7 @@ from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.stations.command_process import CommandProcess
 from riseg_drake.stations.hardware import TARGET_PERIOD
+from riseg_drake.stations.ideal_arm import IdealArm
 from riseg_drake.stations.lcm_channels import LcmConfig
 
 URL = "udpm://239.255.76.67:7699?ttl=0"
@@ -60,19 +59,10 @@ def is_even(gaps: NDArray, period: float) -> bool:
 
 def _feed(config: LcmConfig, commands: CommandProcess, stopping: threading.Event) -> None:
     """An arm that stands still, and targets for it."""
-    lcm = DrakeLcm(config.url)
-    message = lcmt_panda_status()
-    message.num_joints = 7
-    for name in message.__slots__:
-        if name.startswith("joint_"):
-            setattr(message, name, [0.0] * 7)
-    message.joint_position = [float(q) for q in READY]
-    message.robot_mode = lcmt_panda_status.kMove
-    target = 0.0
+    arm, target = IdealArm(config), 0.0
     while not stopping.wait(STATUS_PERIOD):
+        arm.speak()
         now = time.time()
-        message.utime = int(1e6 * now)
-        lcm.Publish(config.status_channel, message.encode())
         if now - target >= TARGET_PERIOD:
             commands.send_target(now, READY)
             target = now

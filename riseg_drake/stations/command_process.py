@@ -143,7 +143,7 @@ class CommandProcess:
 
     def close(self, patience: float = 3.0) -> None:
         """Bring the arm to rest and end the process."""
-        with suppress(OSError):
+        with suppress(CommandError):
             self._send("end")
         deadline = time.monotonic() + patience
         with suppress(EOFError, OSError):
@@ -156,7 +156,10 @@ class CommandProcess:
 
     def _send(self, *message: Any) -> None:
         with self._lock:
-            self._connection.send(message)
+            try:
+                self._connection.send(message)
+            except OSError:
+                raise CommandError("the process that sends commands has ended") from None
 
     def _receive(self) -> Any:
         return self._connection.recv()
