@@ -108,7 +108,8 @@ def judged(
     moving = stamps[1:][np.abs(velocity).max(axis=1) > 1e-6]
     if not (moving < cause).any():
         raise RuntimeError("the arm did not move before it was to stop")
-    acceleration = np.abs(np.diff(velocity, axis=0)) / steps[1:]
+    # A velocity is that of the middle of its step.
+    acceleration = 2 * np.abs(np.diff(velocity, axis=0)) / (steps[1:] + steps[:-1])
     allowed = parameters.limits.stop_acceleration * PANDA_LIMITS.acceleration
     return Stop(max(float(moving[-1]) - cause, 0.0), float((acceleration / allowed).max()))
 
