@@ -2,6 +2,7 @@
 
 import signal
 import threading
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import replace
@@ -39,6 +40,8 @@ def local_pool(jobs: int, work: Work = work_on) -> Pool:
     def outcomes(tasks: Sequence[SceneTask]) -> Iterator[SceneOutcome]:
         threads = max(1, cpu_count() // jobs)
         left = {task.folder: replace(task, threads=threads) for task in tasks}
+        # joblib replaces a process that has grown between two scenes, and wonders aloud.
+        warnings.filterwarnings("ignore", message="A worker stopped", category=UserWarning)
         while left:
             try:
                 for outcome in _parallel(work, list(left.values()), jobs):
