@@ -11,7 +11,7 @@ import numpy as np
 from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.segmentation.surface import seek, surface_pixels
 
-_STEP = 12
+_STEP = 16
 """Every so many pixels in both directions are compared."""
 _DARK, _BRIGHT = 12.0, 245.0
 """Gray levels; what is darker is mostly noise, what is brighter may be cut off."""

@@ -81,6 +81,8 @@ class ReferencePieces(Immutable):
     """[N], of the difference between that and where it should reappear."""
     edges: EdgePixels
     """What sharpens the motions."""
+    whole_edges: EdgePixels
+    """Those of them that lie on a whole, and decide it."""
 
 
 def cut_pieces(
@@ -115,6 +117,8 @@ def cut_pieces(
     core = cv2.erode((whole >= 0).astype(np.uint8), _RIM, borderValue=0) > 0
     witnesses = surface_pixels(core, reference.depth, reference.intrinsics)
     v, u = witnesses.pixel
+    edges = edge_pixels(reference, whole, contrast, variance, wholes, parameters.alignment.pixels)
+    on_whole = np.any(wholes, axis=0)[edges.piece] if wholes else np.zeros(len(edges.piece), bool)
     return ReferencePieces(
         region=region,
         pieces=pieces,
@@ -128,7 +132,8 @@ def cut_pieces(
         piece=whole[v, u],
         gray=reference.gray[v, u],
         variance=variance[v, u],
-        edges=edge_pixels(reference, whole, contrast, variance, wholes, parameters.alignment.pixels),
+        edges=edges,
+        whole_edges=edges.subset(np.flatnonzero(on_whole)),
     )
 
 
@@ -166,7 +171,9 @@ def label_by_motion(
     sums = np.array([np.bincount(pieces.piece, c, count) for c in cost], np.float32)
     unary = sums / np.float32(parameters.correlated_pixels)
     label = _fewest_labels(unary, pieces, parameters)
-    _keep_whole(label, edge_costs(pair, pieces.edges, motions, depth_noise), pieces.edges, parameters)
+    if len(pieces.whole_edges.piece):
+        edge_cost = edge_costs(pair, pieces.whole_edges, motions, depth_noise)
+        _keep_whole(label, edge_cost, pieces.whole_edges, parameters)
     out = np.zeros(pair.reference.depth.shape, np.int16)
     # The last entry is for what is in no piece, whose number is -1.
     out[pieces.region] = np.append(label, 0)[pieces.pieces.label]
