@@ -1,6 +1,7 @@
 """The command line, `riseg`: one command is run, and what is wrong is said in one line."""
 
 import os
+import select
 import sys
 from collections.abc import Sequence
 
@@ -22,7 +23,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt as stop:
         print(f"riseg: stopped{f'; {stop}' if str(stop) else ''}", file=sys.stderr)
         return INTERRUPTED
-    except BrokenPipeError:  # whoever read our output has enough, as `head` does
+    except BrokenPipeError:
+        if not _nobody_reads():
+            raise
+        # Whoever read our output has enough, as `head` does.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except Exception as error:
         if not isinstance(error, _mistakes()):
@@ -30,6 +34,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"riseg: {error}", file=sys.stderr)
         return BAD_INPUT
     return 0
+
+
+def _nobody_reads() -> bool:
+    """Whether the reader of our output is gone; otherwise some other pipe has broken, which is a fault."""
+    output = select.poll()
+    output.register(sys.stdout.fileno(), 0)
+    return any(events & select.POLLERR for _, events in output.poll(0))
 
 
 def _mistakes() -> tuple[type[Exception], ...]:

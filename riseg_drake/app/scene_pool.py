@@ -40,8 +40,6 @@ def local_pool(jobs: int, work: Work = work_on) -> Pool:
     def outcomes(tasks: Sequence[SceneTask]) -> Iterator[SceneOutcome]:
         threads = max(1, cpu_count() // jobs)
         left = {task.folder: replace(task, threads=threads) for task in tasks}
-        # joblib replaces a process that has grown between two scenes, and wonders aloud.
-        warnings.filterwarnings("ignore", message="A worker stopped", category=UserWarning)
         while left:
             try:
                 for outcome in _parallel(work, list(left.values()), jobs):
@@ -106,7 +104,9 @@ def _parallel(work: Work, tasks: Sequence[SceneTask], jobs: int) -> Iterator[Sce
             outcomes = Parallel(return_as="generator_unordered", batch_size=1)(
                 delayed(work)(task) for task in tasks
             )
-        with closing(outcomes):  # ends the processes, too, if nobody wants the rest
+        with closing(outcomes), warnings.catch_warnings():  # ends the processes, too, if nobody wants the rest
+            # joblib replaces a process that has grown between two scenes, and wonders aloud.
+            warnings.filterwarnings("ignore", message="A worker stopped", category=UserWarning)
             yield from outcomes
 
 

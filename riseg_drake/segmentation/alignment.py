@@ -116,11 +116,19 @@ def align_motions(
         p_C0Q = edges.p_C0Q[mine] if len(mine) else edges.p_C0Q
         if all(flow_difference(p_C0Q, motion, X, focal_length) > parameters.same_flow for X in aligned):
             aligned.append(motion)
-    for whole in edges.wholes:
-        mine = np.flatnonzero(whole[edges.piece])
-        if len(mine) < parameters.members_min or cost[:, mine].mean(1).min() < parameters.explained:
-            continue
-        proposed = _propose(pair, image_1, edges.subset(mine), aligned, parameters)
+    wholes = [np.flatnonzero(whole[edges.piece]) for whole in edges.wholes]
+    unexplained = [
+        mine
+        for mine in wholes
+        if len(mine) >= parameters.members_min and cost[:, mine].mean(1).min() >= parameters.explained
+    ]
+    if unexplained:
+        # An edge is sharp: it leads nowhere from more than two pixels away. Blurred, it is seen from afar.
+        v, u = edges.surface.pixel
+        far_image = replace(image_1, gray=_blurred(image_1.gray))
+        far_edges = replace(edges, gray=_blurred(pair.reference.gray)[v, u])
+    for mine in unexplained:
+        proposed = _propose(image_1, edges.subset(mine), far_image, far_edges.subset(mine), aligned, parameters)
         if proposed is not None:
             aligned.append(proposed)
     return np.array(aligned).reshape(-1, 4, 4)
@@ -136,9 +144,10 @@ def edge_costs(
 
 
 def _propose(
-    pair: FramePair,
     image_1: "_Image",
     edges: EdgePixels,
+    far_image: "_Image",
+    far_edges: EdgePixels,
     motions: list[NDArray],
     parameters: AlignmentParameters,
 ) -> NDArray | None:
@@ -147,11 +156,6 @@ def _propose(
         ((float(image_1.cost(edges, X).mean()), k, X) for k, X in enumerate((np.eye(4), *motions))),
     )
     loose = replace(parameters, turn=_LOOSE_TURN, shift=_LOOSE_SHIFT)
-    # An edge is sharp: it leads nowhere from more than two pixels away. Blurred, it is seen from afar.
-    blurred_0, blurred_1 = (_blurred(gray) for gray in (pair.reference.gray, pair.current.unhidden_gray))
-    far_image = replace(image_1, gray=blurred_1)
-    v, u = edges.surface.pixel
-    far_edges = replace(edges, gray=blurred_0[v, u])
     proposals = []
     for _, _, X in known[:3]:
         nearer, _ = far_image.align(far_edges, X, _LOOSE_ROUNDS, loose)

@@ -10,6 +10,21 @@ from riseg_drake.robot.kinematics import READY
 from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm
 
 
+def status_message(
+    now: float, position: NDArray[np.float64], mode: int = lcmt_panda_status.kMove
+) -> lcmt_panda_status:
+    """What a Panda's driver says at a time, s, of joints at rest, rad [7], without any torque."""
+    message = lcmt_panda_status()
+    message.utime = round(1e6 * now)
+    message.num_joints = 7
+    for name in message.__slots__:
+        if name.startswith("joint_"):
+            setattr(message, name, [0.0] * 7)
+    message.joint_position = position.tolist()
+    message.robot_mode = mode
+    return message
+
+
 class IdealArm:
     """Says what a Panda's driver says, and remembers what it is told. Nothing is checked or delayed."""
 
@@ -27,15 +42,8 @@ class IdealArm:
 
     def speak(self) -> None:
         """Publish a status of now, and take in what has come."""
-        message = lcmt_panda_status()
-        message.num_joints = 7
-        for name in message.__slots__:
-            if name.startswith("joint_"):
-                setattr(message, name, [0.0] * 7)
-        message.utime = int(1e6 * time.time())
-        message.joint_position = self.position.tolist()
+        message = status_message(time.time(), self.position, self.mode)
         message.joint_torque_external = self.torque_external.tolist()
-        message.robot_mode = self.mode
         self._lcm.Publish(self._config.status_channel, message.encode())
         self.listen()
 

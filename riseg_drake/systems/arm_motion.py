@@ -14,6 +14,7 @@ from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.pushing.push import ArmPhase, Push
 from riseg_drake.pushing.time_law import minimum_jerk
 from riseg_drake.pushing.tried_pushes import SegmentedSoFar, TriedPush, segmented_so_far
+from riseg_drake.systems.memory import replace_memory
 
 
 class Permission(Enum):
@@ -159,12 +160,8 @@ class ArmMotion(LeafSystem):
         return memory.push.path.phase(time - memory.start_time)
 
     def _update(self, context: Context, state: State) -> EventStatus:
-        before = self._recall(context)
-        after = self._next(before, context)
-        if after is before:
-            return EventStatus.DidNothing()
-        state.get_mutable_abstract_state(int(self._memory)).set_value(after)
-        return EventStatus.Succeeded()
+        after = self._next(self._recall(context), context)
+        return replace_memory(context, state, self._memory, after)
 
     def _next(self, memory: _Memory, context: Context) -> _Memory:
         """One step of the loop; it does one thing at a time, so that each sees the one before done."""

@@ -14,6 +14,7 @@ from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
 from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
 from riseg_drake.pushing.push import ArmPhase
+from riseg_drake.systems.memory import replace_memory
 
 Refinement = Callable[[Frame, NDArray[np.uint16]], NDArray[np.uint16]]
 """Makes of a frame and its mask [H, W] a better mask [H, W] with the same ids. It is called in a thread of its
@@ -97,12 +98,8 @@ class MaskRefiner(LeafSystem):
         return context.get_abstract_state(int(self._memory)).get_value()
 
     def _update(self, context: Context, state: State) -> EventStatus:
-        before = self._recall(context)
-        after = self._next(before, context)
-        if after is before:
-            return EventStatus.DidNothing()
-        state.get_mutable_abstract_state(int(self._memory)).set_value(after)
-        return EventStatus.Succeeded()
+        after = self._next(self._recall(context), context)
+        return replace_memory(context, state, self._memory, after)
 
     def _next(self, memory: _Memory, context: Context) -> _Memory:
         if memory.under_way and memory.under_way[0].done():

@@ -129,10 +129,8 @@ def test_recorded_frames_are_those_that_were_segmented_bit_for_bit(small_scenari
     wired = make_diagram(scenario, seed=1)
     with RecordingWriter(tmp_path, wired.intrinsics) as writer:
         record = run_module.recorder(wired, writer)
-        for _ in interactions(
-            wired, StageClock(), Progress(), 0.5, (record, lambda frame, _: seen.append(frame))
-        ):
-            pass
+        watchers = (record, lambda frame, _: seen.append(frame))
+        assert list(interactions(wired, StageClock(), Progress(), 0.5, watchers))
     assert len(seen) > 5
     for before, after in zip(seen, RecordingReader(tmp_path), strict=True):
         assert after.time == before.time

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
-from drake import lcmt_panda_status
 from pydrake.lcm import DrakeLcm
 from pydrake.systems.analysis import Simulator
 
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.stations.contract import STATION_INPUTS, STATION_OUTPUTS, check_contract
 from riseg_drake.stations.hardware import HardwareStation, HardwareStationConfig
+from riseg_drake.stations.ideal_arm import status_message
 from riseg_drake.stations.lcm_images import ImageError, encode_images
 from riseg_drake.stations.lcm_reception import Reception
 
@@ -37,14 +37,7 @@ class Bench:
         return self.now
 
     def status(self, time, position):
-        message = lcmt_panda_status()
-        message.utime = round(time * 1e6)
-        message.num_joints = 7
-        for name in message.__slots__:
-            if name.startswith("joint_"):
-                setattr(message, name, [0.0] * 7)
-        message.joint_position = list(position)
-        message.robot_mode = 2
+        message = status_message(time, position)
         self.lcm.Publish(self.config.lcm.status_channel, message.encode())
         self.reception.listen()
 

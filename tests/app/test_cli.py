@@ -1,0 +1,29 @@
+"""What becomes of a command whose output nobody reads any more."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from riseg_drake.app import cli
+
+
+def test_a_reader_that_has_enough_is_no_error():
+    reading, writing = os.pipe()
+    os.close(reading)
+    code = "from riseg_drake.app.cli import main; raise SystemExit(main(['diagram']))"
+    done = subprocess.run([sys.executable, "-c", code], stdout=writing, stderr=subprocess.PIPE, check=False)
+    os.close(writing)
+    assert done.returncode == 0
+    assert b"Traceback" not in done.stderr
+
+
+def test_any_other_broken_pipe_is_not_taken_for_success(monkeypatch):
+    def broken(*_: object) -> None:
+        raise BrokenPipeError
+
+    monkeypatch.setattr("riseg_drake.app.commands.diagram", broken)
+    monkeypatch.setattr(cli, "_nobody_reads", lambda: False)
+    with pytest.raises(BrokenPipeError):
+        cli.main(["diagram"])
