@@ -87,6 +87,20 @@ def test_faults_of_real_sensors_are_no_motion_and_hide_none(fault, moves) -> Non
         assert replay.segmentation.object_ids == ()
 
 
+def test_a_body_without_texture_is_found_whole_by_its_edges() -> None:
+    textures = [Blank(gray) for gray in (90.0, 140.0, 60.0)]
+    scene = DrawnScene(SIZES, textures, intrinsics=VGA)
+    frame, labels = scene.frame(0, looking_down(), PLACES, np.random.default_rng(0))
+    twists = {2: sideways(np.array((1.5, -1.0)), float(np.median(frame.depth[labels == 2])), VGA, 0.01)}
+    replay = Replay(Scenario(), FrameView(VGA, None, None), seed=0)
+    film = moved_film(frame.color, frame.depth, labels, VGA, twists, 12, np.random.default_rng(1))
+    for film_frame in film:
+        mask = replay.mask_after(film_frame)
+    scores = score(mask, np.where(film_frame.labels == 2, film_frame.labels, 0))
+    assert scores.objects_found == 1
+    assert scores.overlap_f >= 0.85
+
+
 @pytest.mark.parametrize("size", [(848, 480), (1280, 720)], ids=["848x480", "1280x720"])
 def test_an_object_is_found_in_the_larger_formats_of_real_cameras(size) -> None:
     width, height = size
