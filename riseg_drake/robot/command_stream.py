@@ -101,7 +101,9 @@ class CommandStream:
         parameters.check()
         self._parameters = parameters
         self._tip = tip
-        self._period = 1 / parameters.rate
+        self.mode = parameters.mode
+        self.period = 1 / parameters.rate
+        """Time from one step to the next, s."""
         self._playout = TargetPlayout(parameters.playout)
         self._limiter: CommandLimiter | None = None  # None: the next command is where the arm is
         self._drift = np.zeros(7)
@@ -143,6 +145,15 @@ class CommandStream:
         if self._limiter is not None:
             self._limiter.held_back = False
 
+    def begin_at_rest(self, position: NDArray) -> None:
+        """Go on from joint angles [7], rad, where the arm came to rest because nothing was sent for long."""
+        if self._limiter is None:
+            return
+        self._limiter.restart(position)
+        self._drift = np.zeros(7)
+        self._playout.halt()
+        self._playout.resume_near(position)
+
     def end(self, cause: Cause) -> None:
         """Come to rest for good."""
         if self.state.mode is not Mode.ENDED:
@@ -153,14 +164,14 @@ class CommandStream:
     ) -> NDArray[np.float64] | None:
         """The command of one period: joint angles or velocities [7] by mode; None while there is none."""
         could_move = self.state.may_move
-        target = self._playout.advance(self._period) if could_move else None
+        target = self._playout.advance(self.period) if could_move else None
         self.state = supervise(self.state, self._look(now, status, image_time, target), self._parameters.safety)
         if self.state.may_move and not could_move and self._limiter is not None:
             self._playout.resume_near(self._limiter.position - self._drift)
         if self._limiter is None:
             if not self.state.may_move or status is None:
                 return None
-            self._limiter = CommandLimiter(status.position, self._period, self._parameters.limits)
+            self._limiter = CommandLimiter(status.position, self.period, self._parameters.limits)
             self._drift = np.zeros(7)
             self._playout.resume_near(status.position)
             return self._command()  # the first command: where the arm is
@@ -174,12 +185,12 @@ class CommandStream:
             if status is not None and status.robot_mode != MOVE and self._limiter.at_rest:
                 # It follows nothing now; when it is ready again, it begins anew from where it is.
                 self._limiter = None
-                return np.zeros(7) if self._parameters.mode == VELOCITY else None
+                return np.zeros(7) if self.mode == VELOCITY else None
         return self._command()
 
     def _command(self) -> NDArray[np.float64]:
         assert self._limiter is not None
-        return self._limiter.velocity if self._parameters.mode == VELOCITY else self._limiter.position
+        return self._limiter.velocity if self.mode == VELOCITY else self._limiter.position
 
     def _look(
         self, now: float, status: ArmStatus | None, image_time: float | None, target: Target | None
@@ -206,11 +217,11 @@ class CommandStream:
     def _correct_drift(self, status: ArmStatus | None) -> None:
         """Velocity mode: what was commanded is not quite where the arm came to."""
         assert self._limiter is not None
-        if self._parameters.mode != VELOCITY or status is None or _largest(self._limiter.velocity) > self.SLOW:
+        if self.mode != VELOCITY or status is None or _largest(self._limiter.velocity) > self.SLOW:
             return
         error = self._limiter.position - self._drift - status.position
         speed = np.clip(self.DRIFT_GAIN * error, -self.DRIFT_SPEED, self.DRIFT_SPEED)
-        self._drift = self._drift + speed * self._period
+        self._drift = self._drift + speed * self.period
 
 
 def _largest(difference: NDArray) -> float:

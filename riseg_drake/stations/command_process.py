@@ -31,6 +31,7 @@ from riseg_drake.robot.command_stream import (
 )
 from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import PandaKinematics
+from riseg_drake.robot.paced_commands import PacedCommands
 from riseg_drake.robot.supervisor import Cause, Mode, SafetyState
 from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm
 from riseg_drake.stations.lcm_reception import array_time, status_of
@@ -42,8 +43,6 @@ REPORT_EVERY = 4
 """A report every so many periods."""
 PRIORITY = 20
 """Among real-time processes, where the system allows that."""
-MOST_PERIODS = 8
-"""The trajectory makes up for this many periods at most; after a longer gap it is slower for a moment."""
 MOST_MESSAGES = 200
 """Read from the pipe in one period at most; the rest waits for the next."""
 
@@ -69,10 +68,10 @@ class StreamReport:
     """Why targets were not taken, if they were not."""
 
 
-def command_message(command: NDArray, mode: str, now: float) -> lcmt_panda_command:
+def command_message(command: NDArray, mode: str, stamp: float) -> lcmt_panda_command:
     """What the driver accepts: the fields of its own mode filled, all others empty."""
     message = lcmt_panda_command()
-    message.utime = int(now * 1e6)
+    message.utime = int(stamp * 1e6)
     if mode == VELOCITY:
         message.control_mode_expected = lcmt_panda_status.CONTROL_MODE_VELOCITY
         message.num_joint_velocity, message.joint_velocity = 7, [float(v) for v in command]
@@ -192,8 +191,10 @@ class _News:
         """Take in what has come; returns the arm's newest status."""
         self.lcm.HandleSubscriptions(0)
         if self._status_data is not None:
-            self._status = status_of(lcmt_panda_status.decode(self._status_data))
+            status = status_of(lcmt_panda_status.decode(self._status_data))
             self._status_data = None
+            if self._status is None or status.time > self._status.time:  # on the way some overtake others
+                self._status = status
         return self._status
 
 
@@ -211,29 +212,25 @@ def stream_commands(
     be_prompt(PRIORITY)
     connection.send("ready")
     sent: deque[float] = deque(maxlen=1_000_000)
-    period, refused, rounds, final = 1 / parameters.rate, "", 0, 0
-    due = time.monotonic()
+    refused, rounds, final = "", 0, 0
+    paced = PacedCommands(stream, time.monotonic())
     while final < FINAL_COMMANDS:
         refused = _obey(connection, stream) or refused
         if interrupted.is_set():
             stream.end(Cause.INTERRUPT)
-        status, now, start = news.read(), time.time(), time.monotonic()
-        # After a delay the trajectory goes on to where it should be by now, if that is not far: its speed is
-        # the arm's, by the stamps of the commands.
-        periods = min(1 + max(round((start - due) / period), 0), MOST_PERIODS)
-        for _ in range(periods):
-            command = stream.step(now, status, news.image_time)
-        if command is not None:
-            now = time.time()
-            news.lcm.Publish(lcm.command_channel, command_message(command, parameters.mode, now).encode())
+        status = news.read()
+        command = paced.next(time.monotonic(), time.time(), status, news.image_time)
+        if command is not None and paced.is_in_time(command, time.monotonic()):
+            message = command_message(command.values, parameters.mode, command.stamp)
+            news.lcm.Publish(lcm.command_channel, message.encode())
+            paced.was_sent(command)
             sent.append(time.monotonic())
         if stream.state.mode is Mode.ENDED and stream.at_rest:
             final = final + 1 if command is not None else FINAL_COMMANDS
         rounds += 1
         if rounds % REPORT_EVERY == 0:
             _tell(connection, _report(stream, status, refused))
-        due = due + periods * period if periods < MOST_PERIODS else start + period
-        time.sleep(max(due - time.monotonic(), 0.0))
+        time.sleep(paced.wait(time.monotonic()))
     with suppress(OSError):
         connection.send(_report(stream, news.read(), refused))
         connection.send(np.array(sent))

@@ -50,8 +50,9 @@ class EmulatedArm:
         return self._start_us + TICK_US * self._ticks
 
     def skip(self, microseconds: int) -> None:
-        """Let wall time pass in which nothing happened."""
+        """Let wall time pass in which nothing happened, and nobody listened."""
         self._start_us += microseconds
+        self.driver.miss()
 
     def tick(self) -> None:
         """One millisecond. Raises DriverEndedError."""

@@ -1,8 +1,8 @@
 """What drake-franka-driver and the Panda behind it make of a stream of commands, tick by tick.
 
-The driver holds each command until the next, at the robot's 1 kHz; the robot smooths what it is given,
-follows it, and refuses what its joints could not do. Read in the driver's source (RobotLocomotion/
-drake-franka-driver) and in the Franka Control Interface documentation.
+The driver holds each command until the next, at the robot's 1 kHz; libfranka smooths what it is given and
+limits its rates, and the robot follows. Read in the driver's source (RobotLocomotion/drake-franka-driver: a
+low pass of 30 Hz, `limit_rate`), libfranka's, and the Franka Control Interface documentation.
 """
 
 from dataclasses import dataclass, field
@@ -12,6 +12,7 @@ from drake import lcmt_panda_command, lcmt_panda_status
 from numpy.typing import NDArray
 
 from riseg_drake.robot.limits import PANDA_LIMITS
+from riseg_drake.stations.stream_judge import StreamJudge
 
 MOVE = lcmt_panda_status.kMove
 IDLE = lcmt_panda_status.kIdle
@@ -23,9 +24,6 @@ _EXPECTED = {
     "position": lcmt_panda_status.CONTROL_MODE_POSITION,
 }
 _TICK = 1e-3  # s, of the robot
-_WINDOW = 0.025  # s; acceleration is judged by the mean speeds in two of them, one after the other
-_LONG_WINDOW = 0.1  # s; speed is judged by its mean in one of these
-_LONGEST_PREDICTION = 0.02  # s; after a longer gap no more deviation is forgiven
 
 
 class DriverEndedError(RuntimeError):
@@ -63,6 +61,7 @@ class PandaDriver:
         self.a_d = np.zeros(7)
         self.reflex_reason = ""
         self.robot_mode = IDLE if config.control_mode == "status_only" else MOVE
+        self._judge = StreamJudge(config.control_mode == "velocity", config.jitter, config.step)
         self._start(self.q_d)
 
     def _start(self, q: NDArray) -> None:
@@ -73,7 +72,7 @@ class PandaDriver:
     def _hold(self, q: NDArray) -> None:
         """No stream is coming in: stay at q [7], or at zero speed."""
         self._target = q.copy() if self._config.control_mode != "velocity" else np.zeros(7)
-        self._stream: list[tuple[int, NDArray]] = []  # stamps and targets of the last tenth of a second
+        self._judge.begin()
 
     @property
     def is_moving(self) -> bool:
@@ -93,6 +92,10 @@ class PandaDriver:
         """Somebody pressed the stop button."""
         self.robot_mode = USER_STOPPED
 
+    def miss(self) -> None:
+        """Time was left out in which commands may have come: the next one is not judged by those before."""
+        self._judge.miss()
+
     def die(self) -> None:
         """The driver is gone: the robot stops, and hears nothing until `restart`."""
         self.robot_mode = IDLE
@@ -110,19 +113,18 @@ class PandaDriver:
         v_before = self.v_d
         if self.robot_mode != MOVE:
             self._command = None
-            self._advance(_limited(-self.v_d))
-        elif self._config.control_mode == "position":
-            q = self.q_d + self._gain * (self._target - self.q_d)
-            self.v_d, self.q_d = (q - self.q_d) / _TICK, q
+            most = _TICK * PANDA_LIMITS.acceleration
+            self.v_d = self.v_d - np.clip(self.v_d, -most, most)
         else:
-            self._advance(_limited(self._gain * (self._target - self.v_d)))
-            if not PANDA_LIMITS.contains(self.q_d):
+            if self._config.control_mode == "position":
+                smooth = self._gain * (self._target - self.q_d) / _TICK
+            else:
+                smooth = self.v_d + self._gain * (self._target - self.v_d)
+            self.v_d = limit_rate(smooth, self.v_d, self.a_d)
+            if not PANDA_LIMITS.contains(self.q_d + _TICK * self.v_d):
                 self.enter_reflex("joint_position_limits_violation")
-        self.a_d = (self.v_d - v_before) / _TICK
-
-    def _advance(self, dv: NDArray) -> None:
-        self.v_d = self.v_d + dv
         self.q_d = self.q_d + _TICK * self.v_d
+        self.a_d = (self.v_d - v_before) / _TICK
 
     def _poll(self, now: int) -> None:
         """What the driver does with its newest command, in the driver's order."""
@@ -157,64 +159,23 @@ class PandaDriver:
         """Follow a new command, unless it breaks with those before it."""
         if not np.isfinite(target).all():
             raise DriverEndedError("commanding value is infinite or NaN")
-        if not self._stream:  # it stood still until now
-            self._stream = [(utime - int(2e6 * _LONG_WINDOW), self._target), (utime - 5000, self._target)]
-        gap = (utime - self._stream[-1][0]) / 1e6
-        gap = min(max(gap, _TICK), self._config.expire_sec)
-        break_of_stream = (
-            self._position_break if self._config.control_mode == "position" else self._velocity_break
-        )
-        reason = break_of_stream(target, gap)
+        reason = self._judge.judge(target, utime, self._target, self._config.expire_sec)
         if reason:
             return self.enter_reflex(f"joint_motion_generator_{reason}")
         self._target = target
-        earliest = utime - int(2e6 * _LONG_WINDOW)
-        self._stream = [item for item in self._stream if earliest <= item[0] < utime] + [(utime, target)]
-
-    def _velocity_break(self, v: NDArray, gap: float) -> str:
-        """What is wrong with a velocity [7] that comes `gap` s after the last; "" if nothing is."""
-        if (np.abs(v) > PANDA_LIMITS.velocity).any():
-            return "velocity_limits_violation"
-        most = PANDA_LIMITS.acceleration * (min(gap, _LONGEST_PREDICTION) + self._config.jitter)
-        jump = np.abs(v - self._target) > most + 20 * self._config.step
-        return "acceleration_discontinuity" if jump.any() else ""
-
-    def _position_break(self, q: NDArray, gap: float) -> str:
-        """What is wrong with a position [7] that comes `gap` s after the last; "" if nothing is."""
-        jitter = self._config.jitter
-        q1, q2, q3, q4 = (self._planned_before(age) for age in (0, _WINDOW, 2 * _WINDOW, _LONG_WINDOW))
-        v, v_earlier = (q1 - q2) / _WINDOW, (q2 - q3) / _WINDOW
-        change = np.abs(v - v_earlier)
-        forgiven = (
-            PANDA_LIMITS.acceleration * min(gap, _LONGEST_PREDICTION) ** 2
-            + change * gap  # the mean speed of a window lags behind while it grows
-            + 2 * jitter * np.abs(v)
-            + self._config.step
-        )
-        if (np.abs(q - q1 - v * gap) > forgiven).any():
-            return "velocity_discontinuity"
-        if not PANDA_LIMITS.contains(q):
-            return "position_limits_violation"
-        most = PANDA_LIMITS.acceleration * (_WINDOW + jitter) + 2 * jitter / _WINDOW * np.abs(v) + 0.02
-        if (change > most).any():
-            return "acceleration_discontinuity"
-        if (np.abs(q1 - q4) > PANDA_LIMITS.velocity * (_LONG_WINDOW + 2 * jitter)).any():
-            return "velocity_limits_violation"
-        return ""
-
-    def _planned_before(self, age: float) -> NDArray:
-        """Where the stream was `age` s before its last command, [7]."""
-        when = self._stream[-1][0] - 1e6 * age
-        later = self._stream[-1]
-        for earlier in reversed(self._stream[:-1]):
-            if earlier[0] <= when:
-                share = (when - earlier[0]) / (later[0] - earlier[0])
-                return earlier[1] + share * (later[1] - earlier[1])
-            later = earlier
-        return later[1]
 
 
-def _limited(dv: NDArray) -> NDArray:
-    """A change of speed [7], rad/s, cut to what the joints can do in one tick."""
-    most = PANDA_LIMITS.acceleration * _TICK
-    return np.clip(dv, -most, most)
+def limit_rate(v: NDArray, v_d: NDArray, a_d: NDArray) -> NDArray[np.float64]:
+    """The velocity [7], rad/s, of the next tick: `v`, as far as jerk, acceleration and velocity let it.
+
+    libfranka's franka::limitRate. `v_d`, rad/s, and `a_d`, rad/s^2, are those of the last tick. The nearer
+    a joint is to its greatest speed, the less acceleration is allowed towards it; nothing here brakes ahead
+    of time, so that a step of positions is overshot.
+    """
+    limits = PANDA_LIMITS
+    steepness = limits.jerk / limits.acceleration
+    change = _TICK * limits.jerk
+    wanted = np.clip((v - v_d) / _TICK, a_d - change, a_d + change)
+    most = np.minimum(steepness * (limits.velocity - v_d), limits.acceleration)
+    least = np.maximum(-steepness * (limits.velocity + v_d), -limits.acceleration)
+    return v_d + _TICK * np.clip(wanted, least, most)

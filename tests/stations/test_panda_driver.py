@@ -161,7 +161,7 @@ def test_an_expired_position_holds_and_the_stream_may_go_on_from_there():
     for k in range(60):
         session.send(path(0.005 * k))
     held = path(0.005 * 59)
-    session.wait(300)
+    session.wait(700)
     np.testing.assert_allclose(session.driver.q_d, held, atol=1e-5)
     assert session.send(held).send(held).mode_now == MOVE
     assert session.wait(300).send(held + 0.01).mode_now == REFLEX

@@ -1,0 +1,80 @@
+"""An even stream of commands from a process that is not always woken in time.
+
+Every command is that of a whole number of periods after the one before, and carries the time that it was
+planned for as its stamp, not the time at which the process came to send it. So whoever judges the stream by
+its stamps sees the trajectory as it was planned, whatever kept the process from running, and wherever in
+its work that happened.
+
+A driver holds the last command until the next. After a short pause the arm is still about where the
+trajectory has got to, and the trajectory makes up for it in one step. After a long one the arm has come to
+rest at the last command: the trajectory begins there again, at rest.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.robot.command_stream import VELOCITY, ArmStatus, CommandStream
+
+LONGEST_PAUSE = 0.05
+"""The longest pause that is made up for, s: half the driver's expiry. An arm at 0.3 rad/s brakes in 40 ms."""
+
+
+@dataclass(frozen=True)
+class StampedCommand:
+    """One command to be sent."""
+
+    values: NDArray[np.float64]
+    """Joint angles, rad, or velocities, rad/s, [7] by mode."""
+    stamp: float
+    """The wall time that it was planned for, s."""
+    planned: float
+    """The same by the steady clock, s."""
+
+
+class PacedCommands:
+    """A CommandStream on the clocks of the process that sends its commands; the clocks are given, not asked."""
+
+    def __init__(self, stream: CommandStream, steady: float):
+        """`steady` is the time by a steady clock at which the first command is due, s."""
+        self._stream = stream
+        self._period = stream.period
+        self._due = self._followed = steady
+        self._last: NDArray[np.float64] | None = None
+
+    def next(
+        self, steady: float, wall: float, status: ArmStatus | None, image_time: float | None
+    ) -> StampedCommand | None:
+        """The command that is due now, by both clocks, s; None while there is none."""
+        if steady - self._followed > LONGEST_PAUSE:
+            self._begin_at_rest(status)
+            self._due = steady
+        periods = 1 + max(int((steady - self._due) / self._period), 0)
+        planned = self._due + (periods - 1) * self._period
+        stamp = wall - (steady - planned)
+        for _ in range(periods):
+            values = self._stream.step(wall, status, image_time)
+        self._due = planned + self._period
+        if values is None:
+            self._followed, self._last = planned, None
+            return None
+        return StampedCommand(values, stamp, planned)
+
+    def is_in_time(self, command: StampedCommand, steady: float) -> bool:
+        """Whether a command may be sent at a time, s; else it is to be forgotten, and counts as a pause."""
+        return steady - command.planned <= LONGEST_PAUSE
+
+    def was_sent(self, command: StampedCommand) -> None:
+        """Take note of it: it is what the driver holds until the next."""
+        self._followed, self._last = command.planned, self._stream.position
+
+    def wait(self, steady: float) -> float:
+        """How long there is nothing to do, s."""
+        return max(self._due - steady, 0.0)
+
+    def _begin_at_rest(self, status: ArmStatus | None) -> None:
+        """In velocity mode the arm is wherever it has come to rest, in position mode where it was told to be."""
+        if self._last is None or status is None:
+            return
+        self._stream.begin_at_rest(status.position if self._stream.mode == VELOCITY else self._last)
