@@ -74,7 +74,7 @@ class PacedCommands:
         return max(self._due - steady, 0.0)
 
     def _begin_at_rest(self, status: ArmStatus | None) -> None:
-        """In velocity mode the arm is wherever it has come to rest, in position mode where it was told to be."""
+        """At the last command in position mode, and wherever the arm has come to in velocity mode."""
         if self._last is None or status is None:
             return
         self._stream.begin_at_rest(status.position if self._stream.mode == VELOCITY else self._last)

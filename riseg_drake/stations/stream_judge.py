@@ -30,13 +30,14 @@ class StreamJudge:
         self._jitter, self._step = jitter, step
         self._stream: list[tuple[int, NDArray]] = []  # stamps in us, and targets
         self._missed = False
+        self._unknown_until = 0  # us
 
     def begin(self) -> None:
         """The arm holds still: a new stream must begin there."""
         self._stream = []
 
     def miss(self) -> None:
-        """Nobody listened for some time: whatever comes next is taken as it is."""
+        """Nobody listened for some time: what comes next is taken as it is, until its speed is known again."""
         self._stream, self._missed = [], True
 
     def judge(self, target: NDArray, utime: int, held: NDArray, longest_gap: float) -> str:
@@ -45,24 +46,22 @@ class StreamJudge:
         In libfranka's words, without their `joint_motion_generator_`. A gap longer than `longest_gap`, s, or
         the first target of all, begins a new stream at rest.
         """
+        if self._missed:
+            self._missed, self._unknown_until = False, utime + int(1e6 * _LONG_WINDOW)
+        reason = self._compare(target, utime, held, longest_gap) if utime > self._unknown_until else ""
+        if not reason:
+            earliest = utime - int(2e6 * _LONG_WINDOW)
+            self._stream = [item for item in self._stream if earliest <= item[0] < utime] + [(utime, target)]
+        return reason
+
+    def _compare(self, target: NDArray, utime: int, held: NDArray, longest_gap: float) -> str:
         gap = np.inf if not self._stream else max((utime - self._stream[-1][0]) / 1e6, _TICK)
         reason = self._break(target, gap) if gap <= longest_gap else "velocity_discontinuity"
         if reason and gap > _LONGEST_HELD:  # the arm has been braking since, or stood still
-            resting = self._rest_near(target, held)
+            resting = np.zeros(7) if self._is_velocity else held + np.clip(target - held, -_NEAR, _NEAR)
             self._stream = [(utime - int(1e6 * age), resting) for age in (2 * _LONG_WINDOW, 0.005)]
             reason = self._break(target, 0.005)
-        if reason:
-            return reason
-        earliest = utime - int(2e6 * _LONG_WINDOW)
-        self._stream = [item for item in self._stream if earliest <= item[0] < utime] + [(utime, target)]
-        return ""
-
-    def _rest_near(self, target: NDArray, held: NDArray) -> NDArray:
-        """From where the arm may begin with a target [7]."""
-        if self._missed:
-            self._missed = False
-            return target
-        return np.zeros(7) if self._is_velocity else held + np.clip(target - held, -_NEAR, _NEAR)
+        return reason
 
     def _break(self, target: NDArray, gap: float) -> str:
         return self._velocity_break(target, gap) if self._is_velocity else self._position_break(target, gap)

@@ -12,6 +12,7 @@ from riseg_drake.stations.panda_driver import (
     DriverEndedError,
     PandaDriver,
     PandaDriverConfig,
+    limit_rate,
 )
 
 START = 1_700_000_000_000_000  # us
@@ -165,6 +166,74 @@ def test_an_expired_position_holds_and_the_stream_may_go_on_from_there():
     np.testing.assert_allclose(session.driver.q_d, held, atol=1e-5)
     assert session.send(held).send(held).mode_now == MOVE
     assert session.wait(300).send(held + 0.01).mode_now == REFLEX
+
+
+def test_what_a_driver_that_was_kept_from_running_has_missed_is_not_held_against_the_client():
+    path, session = swing(1.0, 0.35), Session()
+    for k in range(60):
+        session.send(path(0.005 * k))
+    session.now += 200_000  # its process slept, and heard nothing
+    session.driver.miss()
+    for k in range(100, 240):
+        session.send(path(0.005 * k))
+        assert session.mode_now == MOVE, session.driver.reflex_reason
+    assert session.send(READY).mode_now == REFLEX  # it judges again
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_stream_that_paused_may_go_on_or_begin_at_rest_and_nothing_else(mode):
+    def speed(t):
+        return 0.3 * smooth(min(1.0, t / 0.5))
+
+    def paused(pause, following):
+        session, position = Session(mode), READY
+        for k in range(120):
+            position = position + 0.005 * speed(0.005 * k)
+            session.send(position if mode == "position" else np.full(7, speed(0.005 * k)))
+        session.wait(pause)
+        return session.send(following(position) if mode == "position" else following(0.0)).mode_now
+
+    if mode == "position":
+        assert paused(45, lambda q: q + 0.05 * 0.3) == MOVE  # where it should be by now
+        assert paused(45, lambda q: q) == paused(80, lambda q: q) == MOVE
+        assert paused(10, lambda q: q) == REFLEX  # a stop from full speed
+        assert paused(80, lambda q: q - 0.02) == REFLEX
+    else:
+        assert paused(45, lambda v: np.full(7, 0.3)) == paused(80, lambda v: np.zeros(7)) == MOVE
+        assert paused(10, lambda v: np.zeros(7)) == REFLEX
+        assert paused(80, lambda v: np.full(7, -0.3)) == REFLEX
+
+
+def test_rates_are_limited_as_by_libfranka():
+    # A step of velocity: jerk takes 2 ms to the full acceleration, which then holds.
+    v, a, speeds = np.zeros(7), np.zeros(7), []
+    for _ in range(20):
+        v_next = limit_rate(np.full(7, 1.0), v, a)
+        v, a = v_next, (v_next - v) / 1e-3
+        speeds.append(v)
+    ticks = np.arange(1, 21)
+    expected = np.cumsum(np.minimum(0.5 * ticks, 1.0)) * 1e-3 * PANDA_LIMITS.acceleration[0]
+    np.testing.assert_allclose(np.array(speeds)[:, 0], expected, rtol=1e-9)
+
+
+def test_the_greatest_speed_is_neared_and_never_passed():
+    v, a = np.zeros(7), np.zeros(7)
+    for _ in range(1000):
+        v_next = limit_rate(np.full(7, 9.0), v, a)
+        v, a = v_next, (v_next - v) / 1e-3
+    assert (v <= PANDA_LIMITS.velocity).all()
+    np.testing.assert_allclose(v, PANDA_LIMITS.velocity, rtol=1e-3)
+
+
+def test_a_hold_at_speed_is_overshot_as_no_limiter_brakes_ahead_of_time():
+    path, session = swing(1.0, 0.35), Session()
+    for k in range(100):  # 0.66 rad/s
+        session.send(path(0.005 * k))
+    farthest = max(session.wait(1).driver.q_d[1] for _ in range(500)) - path(0.005 * 99)[1]
+    # Braking with 7.5 rad/s^2 takes 29 mm of arc; 30 Hz and the held command leave 5 of them.
+    assert 0.012 < farthest < 0.03
+    session.wait(1500)
+    np.testing.assert_allclose(session.driver.q_d, path(0.005 * 99), atol=1e-4)
 
 
 @pytest.mark.parametrize(("age_ms", "moves"), [(95, True), (105, False), (-105, False)])

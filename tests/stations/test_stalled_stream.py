@@ -1,12 +1,11 @@
-"""What arm and client make of each other when the computer is busy: everything on a clock that the test turns."""
+"""What the arm makes of its commands when the computer is busy: everything on a clock that the test turns."""
 
 import numpy as np
 import pytest
 
 from riseg_drake.robot.command_stream import ArmStatus, CommandParameters, CommandStream, TipGeometry
 from riseg_drake.robot.kinematics import READY
-from riseg_drake.robot.limits import PANDA_LIMITS
-from riseg_drake.robot.paced_commands import LONGEST_PAUSE, PacedCommands
+from riseg_drake.robot.paced_commands import PacedCommands
 from riseg_drake.stations.command_process import command_message
 from riseg_drake.stations.panda_driver import MOVE, PandaDriver, PandaDriverConfig
 
@@ -28,7 +27,7 @@ class Session:
         self.driver = PandaDriver(PandaDriverConfig(control_mode=mode), READY)
         self.paced = PacedCommands(self.stream, STEADY)
         self.now, self.targets = 0.0, 0
-        self.stamps, self.fastest, self.hardest, self.reached = [], 0.0, 0.0, 0.0
+        self.reached = 0.0
         self.stalls = {"asleep": 0.0, "at work": 0.0}
 
     def let(self, seconds):
@@ -38,8 +37,6 @@ class Session:
             self.now += 1e-3
             self.driver.tick(round(1e6 * (WALL + self.now)))
             assert self.driver.robot_mode == MOVE, (self.now, self.driver.reflex_reason)
-            self.fastest = max(self.fastest, np.abs(self.driver.v_d).max())
-            self.hardest = max(self.hardest, (np.abs(self.driver.a_d) / PANDA_LIMITS.acceleration).max())
         self.now = end
 
     def plan(self):
@@ -57,7 +54,6 @@ class Session:
         self.let(self.stalls["at work"])
         if command is not None and self.paced.is_in_time(command, STEADY + self.now):
             self.paced.was_sent(command)
-            self.stamps.append(command.stamp)
             if self.rng.random() >= self.lost:
                 self.driver.receive(command_message(command.values, self.mode, command.stamp))
         self.let(self.paced.wait(STEADY + self.now) + self.stalls["asleep"])
@@ -80,7 +76,6 @@ def test_a_stall_of_any_length_at_full_speed_is_no_reflex_and_the_motion_goes_on
     session.stalls[where] = stall
     session.run(1.5)
     assert session.reached > 0.24
-    np.testing.assert_array_less(np.abs(session.driver.a_d), PANDA_LIMITS.acceleration * (1 + 1e-9))
 
 
 @pytest.mark.parametrize("mode", ["position", "velocity"])
@@ -94,30 +89,3 @@ def test_a_busy_computer_and_lost_commands_are_no_reflex(seed, mode):
             session.stalls[where] = session.rng.choice([0.003, 0.008, 0.02, 0.05, 0.15])
         session.cycle()
     assert session.reached > 0.05
-
-
-def test_stamps_are_even_however_late_the_process_is():
-    session = Session("position").run(1.0)
-    for _ in range(200):
-        session.stalls["asleep" if session.rng.random() < 0.5 else "at work"] = session.rng.uniform(0, 0.02)
-        session.cycle()
-    periods = np.diff(session.stamps) / session.stream.period
-    np.testing.assert_allclose(periods, np.rint(periods), atol=1e-4)
-    assert periods.max() > 2
-
-
-def test_after_a_long_pause_the_arm_begins_where_it_was_held_and_at_rest():
-    session = Session("position").run(1.3)
-    held = session.stream.position.copy()
-    session.let(0.3)
-    session.cycle()
-    np.testing.assert_allclose(session.stream.position, held, atol=1e-4)
-    assert np.abs(session.stream._limiter.velocity).max() < 0.02
-
-
-def test_a_command_that_took_too_long_is_not_sent():
-    session = Session("position").run(1.3)
-    sent = len(session.stamps)
-    session.stalls["at work"] = LONGEST_PAUSE + 0.01
-    session.cycle()
-    assert len(session.stamps) == sent
