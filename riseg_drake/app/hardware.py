@@ -16,12 +16,12 @@ from riseg_drake.app.diagram import Drivers, WiredDiagram, make_diagram
 from riseg_drake.app.dry_run import DryRun
 from riseg_drake.app.interactions import Listener, Progress, TruthSource, WallClock, interactions
 from riseg_drake.app.output import RECORDING, RunFolder, Step
-from riseg_drake.app.run import Narrator, recorder, report, state_of
+from riseg_drake.app.run import Narrator, report, state_of
+from riseg_drake.app.run_recording import recording_of
 from riseg_drake.app.scenario import HARDWARE, Scenario, load_scenario, scenario_name
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.terminal_operator import TerminalOperator
 from riseg_drake.app.truth_reception import TruthReception
-from riseg_drake.recording.writer import RecordingWriter
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture
 from riseg_drake.stations.command_process import CommandProcess
 from riseg_drake.stations.hardware import HardwareStationConfig
@@ -169,8 +169,10 @@ class _Session:
             )
             listeners: list[Listener] = []
             if record:
-                writer = stack.enter_context(RecordingWriter(self._folder.path / RECORDING, wired.intrinsics))
-                listeners.append(recorder(wired, writer, self._truth))
+                recording = recording_of(
+                    wired, self._scenario, self._seed, self._truth, self._folder.path / RECORDING
+                )
+                listeners.append(stack.enter_context(recording))
             self._interact(wired, ArmWatch(wired, commands, self._operator, self._progress), listeners)
         if len(commands.send_times) > 1:
             gaps = np.diff(commands.send_times)

@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
-from pydrake.common.yaml import yaml_dump_typed
 from pydrake.geometry import Meshcat, StartMeshcat
 from pydrake.systems.framework import Context
 from rich.console import Console
@@ -16,15 +15,14 @@ from rich.status import Status
 
 from riseg_drake.app.diagram import WiredDiagram, make_diagram
 from riseg_drake.app.graphics import require_graphics
-from riseg_drake.app.interactions import Listener, Progress, TruthSource, interactions, simulated_truth
-from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step, stage_figures, to_json
+from riseg_drake.app.interactions import Listener, Progress, interactions, simulated_truth
+from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step, stage_figures
+from riseg_drake.app.run_recording import recording_of
 from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
 from riseg_drake.app.tables import score_table, stage_table
 from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.rgbd import Frame
-from riseg_drake.recording.layout import RUN_FILE, SCENARIO_FILE, RecordedFrame
 from riseg_drake.recording.whole_file import write_text
-from riseg_drake.recording.writer import RecordingWriter
 from riseg_drake.systems.mask_refiner import RefinedMask
 from riseg_drake.systems.stage_clock import StageClock
 
@@ -69,10 +67,8 @@ def run(
         refined = RefinedSteps(wired, folder, steps)
         listeners: list[Listener] = [lambda *_: narrator.follow(progress), refined.look]
         if record:
-            writer = stack.enter_context(RecordingWriter(folder.path / RECORDING, wired.intrinsics))
-            write_text(writer.folder / SCENARIO_FILE, yaml_dump_typed(scenario))
-            write_text(writer.folder / RUN_FILE, to_json({"seed": seed}))
-            listeners.append(recorder(wired, writer))
+            recording = recording_of(wired, scenario, seed, simulated_truth(wired), folder.path / RECORDING)
+            listeners.append(stack.enter_context(recording))
         if meshcat is not None:
             stack.enter_context(_replay(meshcat, folder.path / REPLAY))
         for step in interactions(wired, StageClock(), progress, scenario.longest, tuple(listeners)):
@@ -150,27 +146,6 @@ def state_of(folder: RunFolder, progress: Progress, steps: list[Step]) -> Iterat
         finish("failed", " ".join(str(error).split()))
         raise
     finish("done", progress.end)
-
-
-def recorder(wired: WiredDiagram, writer: RecordingWriter, truth: TruthSource | None = None) -> Listener:
-    """Writes every frame, with the true labels where they are known."""
-    truth = truth or simulated_truth(wired)
-
-    def record(frame: Frame, context: Context) -> None:
-        known = truth(frame, context)
-        writer.append(
-            RecordedFrame(
-                time=frame.time,
-                color=frame.color,
-                depth=frame.depth,
-                X_WC=frame.X_WC,
-                position=wired.position(context),
-                robot=frame.robot,
-                labels=known.labels if known else None,
-            )
-        )
-
-    return record
 
 
 class RefinedSteps:

@@ -26,6 +26,8 @@ from ruckig import (
 
 from riseg_drake.robot.limits import PANDA_LIMITS, PandaLimits
 
+_TINY = 1e-3  # rad; no target is taken for one beyond a range for less
+
 
 @dataclass
 class CommandLimits:
@@ -109,7 +111,7 @@ class CommandLimiter:
         self.velocity = np.zeros(7)
         self.acceleration = np.zeros(7)
         self.held_back = False
-        """Whether the last wish led out of the joints' ranges and the arm came to a stop instead."""
+        """Whether the last wish led out of the joints' ranges; the arm stays within, or comes to a stop."""
         self._stop, self._stopped_for = self._stop_from(self.position, self.velocity, self.acceleration), 0.0
 
     @property
@@ -124,13 +126,13 @@ class CommandLimiter:
 
     def follow(self, target: Target) -> NDArray[np.float64]:
         """Advance by one period towards a target; returns the command, rad [7]."""
-        target = self._within_ranges(target)
+        target, leads_out = self._within_ranges(target)
         candidate = self._follow_linearly(target) or self._approach(target)
         if candidate is not None:
             stop = self._stop_from(*candidate)
             if self._keeps_to_ranges(stop):
                 self.position, self.velocity, self.acceleration = candidate
-                self._stop, self._stopped_for, self.held_back = stop, 0.0, False
+                self._stop, self._stopped_for, self.held_back = stop, 0.0, leads_out
                 return self.position
         self.held_back = True
         return self.stop()
@@ -147,11 +149,16 @@ class CommandLimiter:
             )
         return self.position
 
-    def _within_ranges(self, target: Target) -> Target:
-        """The nearest target in the joints' ranges; it stands still in the joints that had to be moved."""
-        position = np.clip(target.position, self._lower, self._upper)
+    def _within_ranges(self, target: Target) -> tuple[Target, bool]:
+        """The nearest target in the joints' ranges, still in the joints that had to be moved; whether any had.
+
+        A joint that was put beyond its margin by hand may come back from there.
+        """
+        lower, upper = np.minimum(self._lower, self.position), np.maximum(self._upper, self.position)
+        position = np.clip(target.position, lower, upper)
         inside = position == target.position
-        return Target(position, target.velocity * inside, target.acceleration * inside)
+        leads_out = bool(np.abs(position - target.position).max() > _TINY)
+        return Target(position, target.velocity * inside, target.acceleration * inside), leads_out
 
     def _follow_linearly(self, target: Target) -> tuple[NDArray, NDArray, NDArray] | None:
         """The state after one period of the jerk that brings the target, None if that breaks a limit."""

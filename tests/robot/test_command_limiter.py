@@ -62,9 +62,19 @@ def test_a_target_beyond_a_joint_is_not_followed_out_of_its_range():
     beyond = PANDA_LIMITS.position_upper + 1
     for _ in range(1500):
         limiter.follow(still(beyond))
+        assert limiter.held_back
     room = PANDA_LIMITS.room(limiter.position)
     assert room.min() >= CommandLimits().position_margin - 1e-6
     assert limiter.at_rest
+
+
+def test_an_arm_that_was_put_beyond_its_margin_by_hand_may_come_back():
+    start = PANDA_LIMITS.position_upper - 0.01
+    limiter = CommandLimiter(start)
+    for back in np.arange(0, 0.1, 0.0005):
+        limiter.follow(still(start - back))
+        assert not limiter.held_back
+    assert PANDA_LIMITS.room(limiter.position).min() > CommandLimits().position_margin
 
 
 def test_a_target_that_races_towards_the_end_of_a_range_is_given_up_in_time():

@@ -14,7 +14,7 @@ from riseg_drake.robot.command_stream import (
     CommandStream,
     TipGeometry,
 )
-from riseg_drake.robot.kinematics import READY
+from riseg_drake.robot.kinematics import READY, PandaKinematics, tip_pointing_down
 from riseg_drake.robot.limits import PANDA_LIMITS
 from riseg_drake.robot.supervisor import MOVE, REFLEX, Cause, Mode
 
@@ -250,6 +250,37 @@ def test_an_arm_that_was_carried_away_is_not_driven_back_unasked():
     arm.stream.release()
     arm.run(0.5)
     assert arm.stream.state.cause is Cause.GAP
+
+
+def test_a_plan_that_leads_out_of_a_joints_range_is_a_stop_before_its_end():
+    arm = Arm()
+    arm.step()
+    beyond = READY.copy()
+    beyond[3] = PANDA_LIMITS.position_upper[3] + 0.1
+    arm.plan(beyond)
+    arm.run(15)
+    assert arm.stream.state.cause is Cause.JOINT_LIMIT
+    assert PANDA_LIMITS.contains(arm.sent()[-1], margin=CommandLimits().position_margin - 1e-6)
+    assert arm.sent()[-1][3] > beyond[3] - 0.2  # it got there
+    assert within_limits(arm.sent())
+
+
+def test_a_plan_that_leads_out_of_the_workspace_is_a_stop_within_it():
+    kinematics = PandaKinematics()
+    arm = Arm()
+    lowest = arm.parameters.safety.workspace_lower[2] = 0.03
+    arm.stream = CommandStream(
+        arm.parameters, TipGeometry(lambda q: kinematics.X_WE(q)[:3, 3], kinematics.tip_jacobian)
+    )
+    arm.step()
+    down = kinematics.solve_ik(tip_pointing_down([0.48, 0.0, 0.01], 0.0))
+    arm.plan(down)
+    arm.run(10)
+    assert arm.stream.state.cause is Cause.WORKSPACE
+    heights = [kinematics.X_WE(q)[2, 3] for q in arm.sent()[::5]]
+    assert heights[0] > lowest + 0.02
+    assert lowest - 1e-3 < min(heights) < lowest + 0.01
+    assert within_limits(arm.sent())
 
 
 def test_contact_is_allowed_in_a_push_only():

@@ -1,5 +1,7 @@
 """The process itself, on a network of its own within this machine."""
 
+import os
+import signal
 import time
 
 import numpy as np
@@ -10,9 +12,9 @@ from riseg_drake.robot.command_stream import CommandParameters
 from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.supervisor import Cause, Mode
-from riseg_drake.stations.command_process import CommandProcess, command_message
+from riseg_drake.stations.command_process import FINAL_COMMANDS, CommandProcess, command_message
 from riseg_drake.stations.ideal_arm import IdealArm
-from riseg_drake.stations.lcm_channels import LcmConfig
+from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm
 
 
 @pytest.mark.parametrize("mode", ["position", "velocity"])
@@ -55,3 +57,66 @@ def test_it_holds_the_arm_stops_for_a_reflex_and_ends_when_told():
         arm.mode = lcmt_panda_status.kMove
         speak_until(arm, lambda: commands.report.state.may_move)
     assert len(commands.send_times) > 20
+
+
+class Swinging:
+    """A process that moves an arm, with camera and status, and every command that it sends."""
+
+    def __init__(self, mode="position"):
+        self.config = LcmConfig(url=f"udpm://239.255.76.67:{30000 + os.getpid() % 20000}?ttl=0")
+        self.arm, self.sent = IdealArm(self.config), []
+        self.ears = open_lcm(self.config)
+        self.ears.Subscribe("PANDA_COMMAND", lambda raw: self.sent.append(lcmt_panda_command.decode(raw)))
+        self.commands = CommandProcess(self.config, CommandParameters(mode=mode), PandaDescription())
+        self.start, self.targets = time.time(), 0
+
+    def until(self, condition, plans=True):
+        deadline = time.monotonic() + 30
+        while not condition():
+            assert time.monotonic() < deadline
+            while plans and self.targets * 0.01 <= time.time() - self.start:
+                t = self.targets * 0.01
+                self.commands.send_target(self.start + t, READY + 0.2 * (1 - np.cos(2 * t)))
+                self.targets += 1
+            self.arm.speak()
+            self.arm.show()
+            self.ears.HandleSubscriptions(0)
+            time.sleep(0.002)
+
+    def speed(self):
+        """Of the newest command, rad/s."""
+        if len(self.sent) < 2:
+            return 0.0
+        a, b = self.sent[-2:]
+        if b.num_joint_velocity:
+            return np.abs(b.joint_velocity).max()
+        return np.abs(np.subtract(b.joint_position, a.joint_position)).max() / (
+            1e-6 * max(b.utime - a.utime, 1)
+        )
+
+
+def ctrl_c(session):
+    os.kill(session.commands._process.pid, signal.SIGINT)
+
+
+def die(session):
+    session.commands._connection.close()
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize(("happens", "mode"), [(ctrl_c, "position"), (ctrl_c, "velocity"), (die, "position")])
+def test_at_ctrl_c_or_left_alone_the_process_brings_the_arm_to_rest_and_ends(happens, mode):
+    session = Swinging(mode)
+    session.until(lambda: session.speed() > 0.1)
+    moving = len(session.sent)
+    happens(session)
+    session.until(lambda: not session.commands._process.is_alive(), plans=False)
+    session.ears.HandleSubscriptions(0)
+    last = session.sent[-FINAL_COMMANDS // 2 :]
+    assert moving < len(session.sent) - len(last)
+    if mode == "velocity":
+        assert {v for command in last for v in command.joint_velocity} == {0.0}
+    else:
+        assert {tuple(command.joint_position) for command in last} == {tuple(last[0].joint_position)}
+    if happens is ctrl_c:
+        assert session.commands.report.state.cause is Cause.INTERRUPT

@@ -1,0 +1,86 @@
+import io
+from types import SimpleNamespace
+
+import numpy as np
+from rich.console import Console
+
+from riseg_drake.app import dry_run
+from riseg_drake.app.dry_run import DryRun
+from riseg_drake.app.scenario import HARDWARE, load_scenario
+from riseg_drake.robot.kinematics import READY, PandaKinematics
+from riseg_drake.systems.arm_motion import Permission
+
+
+class Browser:
+    """As much of Meshcat as is used."""
+
+    def __init__(self):
+        self.ways = []
+
+    def SetLine(self, path, vertices, *_):
+        self.ways.append(vertices)
+
+
+class Person:
+    """Answers as told."""
+
+    def __init__(self, *answers):
+        self.answers = list(answers)
+
+    def answer(self, question, choices):
+        return self.answers.pop(0)
+
+
+def push(turn=0.2):
+    """A push whose path turns joint 1."""
+    path = SimpleNamespace(
+        duration=2.0, position=lambda t: READY + np.array([turn * t / 2.0, 0, 0, 0, 0, 0, 0])
+    )
+    return SimpleNamespace(path=path, p_WB=np.array([0.5, 0.1, 0.02]))
+
+
+def made(*answers):
+    scenario, out, browser = load_scenario(None, HARDWARE), io.StringIO(), Browser()
+    person = Person(*answers) if answers else None
+    return DryRun(scenario, browser, person, Console(file=out, width=200)), browser, out, scenario
+
+
+def test_every_push_is_drawn_once_and_none_is_done():
+    run, browser, out, scenario = made("", "", *"nnnnn")
+    said = []
+    for _ in range(scenario.arm.most_interactions):
+        wanted = push()
+        said += [run.permit(wanted)]
+        while said[-1] is Permission.WAIT:
+            said += [run.permit(wanted)]
+    assert Permission.DO not in said
+    assert said.count(Permission.WAIT) == 2
+    assert said[-1] is Permission.END
+    assert len(browser.ways) == out.getvalue().count("push ") == scenario.arm.most_interactions
+
+
+def test_the_way_that_is_drawn_is_the_tips():
+    run, browser, out, _ = made("n")
+    wanted = push(turn=0.3)
+    run.permit(wanted)
+    kinematics = PandaKinematics()
+    for k, t in ((0, 0.0), (-1, 2.0)):
+        np.testing.assert_allclose(
+            browser.ways[0][:, k], kinematics.X_WE(wanted.path.position(t))[:3, 3], atol=1e-12
+        )
+    least = min(kinematics.clearance(wanted.path.position(t)) for t in np.linspace(0, 2, 50))
+    assert f"nothing nearer than {1e3 * least:.0f} mm" in out.getvalue()
+
+
+def test_the_operator_may_end_it():
+    assert made("q")[0].permit(push()) is Permission.END
+
+
+def test_unasked_each_push_is_shown_for_a_while(monkeypatch):
+    run, *_ = made()
+    now = 100.0
+    monkeypatch.setattr(dry_run.time, "monotonic", lambda: now)
+    wanted = push()
+    assert run.permit(wanted) is Permission.WAIT
+    now += dry_run.SHOWN_FOR
+    assert run.permit(wanted) is Permission.SKIP
