@@ -86,6 +86,7 @@ def _run(
         if sys.stdin.isatty():
             console.print(f"you may type: {WORDS}")
         threading.Thread(target=_pass_on, args=(config.lcm, console), daemon=True).start()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a shell's background programs hear no Ctrl-C
     be_prompt(_PRIORITY)  # as the real arm, which has a computer of its own
     start = time()
     try:

@@ -102,7 +102,7 @@ def listening(
     reception = Reception(lcm, config.lcm, replayed)
     source: TruthSource = lambda frame, context: None  # noqa: E731
     if truth:
-        source = TruthReception(lcm, config.camera.first_column)
+        source = TruthReception(lcm, config.camera.first_column, lambda: reception.offset)
     reception.start()
     try:
         yield reception, source

@@ -1,6 +1,7 @@
 """What an emulator says of the truth, for scores; the diagram of a real robot never sees it."""
 
 from collections import OrderedDict
+from collections.abc import Callable
 
 from drake import lcmt_image_array, lcmt_viewer_draw
 from pydrake.lcm import DrakeLcmInterface
@@ -18,11 +19,14 @@ KEPT = 60
 class TruthReception:
     """Listens on the emulator's own channels, and answers as a TruthSource.
 
-    `first_column` is where the part of the pictures begins that is used, px.
+    `first_column` is where the part of the pictures begins that is used, px; `offset` tells by how much the
+    stamps of frames differ from those of the emulator, s: that of a Reception of a replayed log.
     """
 
-    def __init__(self, lcm: DrakeLcmInterface, first_column: int = 0):
-        self._first_column = first_column
+    def __init__(
+        self, lcm: DrakeLcmInterface, first_column: int = 0, offset: Callable[[], float] = lambda: 0.0
+    ):
+        self._first_column, self._offset = first_column, offset
         self._labels: OrderedDict[int, bytes] = OrderedDict()
         self._poses: OrderedDict[int, lcmt_viewer_draw] = OrderedDict()
         lcm.Subscribe(LABEL_CHANNEL, self._take_labels)
@@ -30,7 +34,7 @@ class TruthReception:
 
     def __call__(self, frame: Frame, context: Context | None = None) -> Truth | None:
         """The truth behind a frame, by its stamp in milliseconds; None where it has not come."""
-        stamp = round(1e3 * frame.time)
+        stamp = round(1e3 * (frame.time - self._offset()))
         labels, poses = self._labels.get(stamp), self._poses.get(stamp)
         if labels is None or poses is None:
             return None

@@ -1,6 +1,7 @@
 """Two processes on the real network; every wait ends with a message or with the deadline of the test."""
 
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -123,10 +124,11 @@ def test_a_client_moves_the_arm_sees_pictures_and_is_taught_manners(emulator):
 
 
 @pytest.mark.renders
-def test_ctrl_c_ends_both_processes_and_says_the_rates(emulator):
+@pytest.mark.parametrize("told", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_or_kill_ends_both_processes_and_says_the_rates(emulator, told):
     client, process, _ = emulator
     client.until(lambda: client.pictures > 1)
-    process.send_signal(2)
+    process.send_signal(told)
     out, err = process.communicate(timeout=DEADLINE)
     assert process.returncode == 0
     assert err == ""

@@ -78,9 +78,10 @@ def test_the_arm_does_not_travel_through_the_table():
     assert straight_motion(kinematics, READY, READY + 0.1, SpeedLimits()).end_time() > 0
 
 
-def test_the_truth_behind_a_picture_is_found_by_its_stamp():
+@pytest.mark.parametrize("offset", [0.0, 86400.1234567])
+def test_the_truth_behind_a_picture_is_found_by_its_stamp_in_a_replayed_log_too(offset):
     lcm = DrakeLcm("memq://")
-    truth = TruthReception(lcm, first_column=2)
+    truth = TruthReception(lcm, first_column=2, offset=lambda: offset)
     stamp = 1_790_000_000_123
     labels = np.arange(24, dtype=np.uint16).reshape(3, 8)
     poses = encode_poses({1: "duck"}, {1: RigidTransform([0.1, 0.2, 0.3])}, stamp)
@@ -92,10 +93,10 @@ def test_the_truth_behind_a_picture_is_found_by_its_stamp():
         color = np.zeros((3, 4, 3), np.uint8)
         return Frame(0, time, None, color, color[..., 0], np.eye(4), color[..., 0] > 0)
 
-    known = truth(frame(stamp / 1e3))
+    known = truth(frame(stamp / 1e3 + offset))
     np.testing.assert_array_equal(known.labels, labels[:, 2:6])
     np.testing.assert_allclose(known.poses["duck"][:3, 3], [0.1, 0.2, 0.3], atol=1e-6)
-    assert truth(frame(stamp / 1e3 + 0.1)) is None
+    assert truth(frame(stamp / 1e3 + offset + 0.1)) is None
 
 
 @pytest.mark.parametrize(
