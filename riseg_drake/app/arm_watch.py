@@ -1,5 +1,6 @@
 """Looks after a real arm while the diagram runs: stops, pauses, and when contact is planned."""
 
+import math
 import time
 
 from pydrake.systems.framework import Context
@@ -8,7 +9,7 @@ from riseg_drake.app.diagram import WiredDiagram
 from riseg_drake.app.interactions import Progress
 from riseg_drake.app.terminal_operator import TerminalOperator
 from riseg_drake.pushing.push import ArmPhase, Push
-from riseg_drake.robot.supervisor import Mode
+from riseg_drake.robot.supervisor import Cause, Mode
 from riseg_drake.stations.command_process import CommandProcess
 
 CONTACT_MARGIN = 0.3
@@ -20,6 +21,8 @@ class ArmWatch:
 
     PERIOD = 0.02
     """Time between two looks, s."""
+    QUIET = 10.0
+    """A pause is not told again this soon, s."""
 
     def __init__(
         self, wired: WiredDiagram, commands: CommandProcess, operator: TerminalOperator, progress: Progress
@@ -28,6 +31,9 @@ class ArmWatch:
         self._push: Push | None = None
         self._next = 0.0
         self._said = Mode.FOLLOWING
+        self._told: dict[Cause, float] = {}
+        self.pauses = 0
+        """How often the arm has paused so far."""
 
     def __call__(self, context: Context) -> bool:
         """Whether the run has come to its end."""
@@ -43,10 +49,17 @@ class ArmWatch:
             self._ask(state.cause.value)
         elif state.mode is Mode.ENDED or report.refused:
             self._progress.end = report.refused or state.cause.value
-        elif state.mode is not self._said and state.mode is Mode.PAUSED:
-            self._operator.tell(f"paused: {state.cause.value}")
+        elif state.mode is Mode.PAUSED and self._said is not Mode.PAUSED:
+            self._tell_pause(state.cause)
         self._said = state.mode
         return bool(self._progress.end)
+
+    def _tell_pause(self, cause: Cause) -> None:
+        self.pauses += 1
+        now = time.monotonic()
+        if now - self._told.get(cause, -math.inf) >= self.QUIET:
+            self._told[cause] = now
+            self._operator.tell(f"paused: {cause.value}")
 
     def _announce_contact(self, context: Context) -> None:
         push: Push | None = self._wired.read("active_push", context)

@@ -18,8 +18,7 @@ from riseg_drake.robot.silhouette import RobotSilhouette
 from riseg_drake.segmentation.above_table import objects_above_table
 from riseg_drake.segmentation.hand_eye import draw_flow_error, flow_errors, verdict
 from riseg_drake.stations.command_process import CommandProcess
-from riseg_drake.stations.hardware import HardwareStationConfig, as_drake_images
-from riseg_drake.stations.lcm_images import decode_images
+from riseg_drake.stations.hardware import HardwareCameraConfig, HardwareStationConfig, newest_sight
 from riseg_drake.stations.lcm_reception import Reception
 
 OFFSETS = ((0.04, 0.0, 0.0), (0.0, 0.04, 0.1), (-0.04, 0.0, 0.0), (0.0, -0.04, -0.1), (0.0, 0.0, 0.0))
@@ -39,7 +38,7 @@ def hand_eye_command(scenario_file: Path | None, output: Path | None, yes: bool,
     operator = TerminalOperator(console, yes)
     with listening(config, replayed=False, truth=False) as (reception, _):
         wait_for_drivers(reception, config)
-        camera = _Collector(reception, config, kinematics)
+        camera = _Collector(reception, config.camera, kinematics)
         with CommandProcess(config.lcm, config.command, config.panda) as commands:
             operator.confirm("the arm goes to where it looks from, and 4 cm around; nothing else may move")
             assert reception.status is not None
@@ -79,32 +78,27 @@ def hand_eye_command(scenario_file: Path | None, output: Path | None, yes: bool,
 class _Collector:
     """Keeps every picture with the arm's pose of its time."""
 
-    def __init__(self, reception: Reception, config: HardwareStationConfig, kinematics: PandaKinematics):
+    def __init__(self, reception: Reception, config: HardwareCameraConfig, kinematics: PandaKinematics):
         self._reception, self._config, self._kinematics = reception, config, kinematics
-        self._silhouette = RobotSilhouette(kinematics, config.camera.intrinsics)
+        self._silhouette = RobotSilhouette(kinematics, config.intrinsics)
         self._newest = time.time()
         self.frames: list[Frame] = []
 
     def look(self) -> None:
         """Take in the newest picture, if there is another."""
-        message = self._reception.newest_picture(after=self._newest)
-        if message is None:
+        sight = newest_sight(self._reception, self._config, after=self._newest)
+        if sight is None:
             return
-        images = decode_images(message)
-        arm = self._reception.state_at(images.time - self._config.camera.latency)
-        if arm is None:
-            return
-        self._newest = message.header.utime * 1e-6
-        color, depth = as_drake_images(images, self._config.camera)
+        self._newest = sight.sent
         self.frames.append(
             Frame(
                 sequence=len(self.frames),
-                time=images.time,
-                intrinsics=self._config.camera.intrinsics,
-                color=color.data[..., :3].copy(),
-                depth=depth.data[..., 0].copy(),
-                X_WC=self._kinematics.X_WC(arm[0]),
-                robot=self._silhouette.mask(arm[0]),
+                time=sight.time,
+                intrinsics=self._config.intrinsics,
+                color=sight.color.data[..., :3].copy(),
+                depth=sight.depth.data[..., 0].copy(),
+                X_WC=self._kinematics.X_WC(sight.position),
+                robot=self._silhouette.mask(sight.position),
             )
         )
 

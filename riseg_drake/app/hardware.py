@@ -173,7 +173,9 @@ class _Session:
                     wired, self._scenario, self._seed, self._truth, self._folder.path / RECORDING
                 )
                 listeners.append(stack.enter_context(recording))
-            self._interact(wired, ArmWatch(wired, commands, self._operator, self._progress), listeners)
+            watch = ArmWatch(wired, commands, self._operator, self._progress)
+            self._interact(wired, watch, listeners)
+            self._folder.note(pauses=watch.pauses)
         if len(commands.send_times) > 1:
             gaps = np.diff(commands.send_times)
             self._folder.note(

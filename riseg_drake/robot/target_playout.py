@@ -95,23 +95,13 @@ class TargetPlayout:
         self._positions.clear()
         self._last_change, self.time, self.rate = -np.inf, None, 0.0
 
-    def resume_near(self, position: NDArray, reach: float = 0.5) -> float:
-        """Go on from the point of the path nearest to `position` [7], at most `reach` s ahead.
-
-        Returns the largest joint difference to it, rad; 0 where there are no targets.
-        """
+    def resume_near(self, position: NDArray, reach: float = 0.5) -> None:
+        """Go on from the point of the path nearest to `position` [7]: where it is, or up to `reach` s ahead."""
         if self.time is None:
-            return 0.0
-        times = np.array(self._times)
-        near = (times >= self.time) & (times <= self.time + reach)
-        if near.any():
-            candidates = [k for k in np.flatnonzero(near)]
-            differences = [np.abs(self._positions[k] - position).max() for k in candidates]
-            best = int(np.argmin(differences))
-            here = np.abs(self._at(self.time).position - position).max()
-            if differences[best] < here:
-                self.time = float(times[candidates[best]])
-        return float(np.abs(self._at(self.time).position - position).max())
+            return
+        here = self.time
+        ahead = [time for time in self._times if here < time <= here + reach]
+        self.time = min([here, *ahead], key=lambda t: float(np.abs(self._at(t).position - position).max()))
 
     def _forget(self) -> None:
         """Drop what no interpolation needs any more."""

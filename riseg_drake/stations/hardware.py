@@ -165,19 +165,39 @@ class Targets(LeafSystem):
 
 
 @dataclass(frozen=True)
-class _Shown:
-    """What the ports show. Never changed, only replaced."""
+class Sight:
+    """A picture with the arm at the time it was taken. Never changed, only replaced."""
 
     color: ImageRgba8U
     depth: ImageDepth32F
     time: float
+    """When it was taken, s."""
     sent: float
     """The message's own stamp, s, which tells whether another is newer."""
     position: NDArray[np.float64]
+    """rad [7]"""
     velocity: NDArray[np.float64]
+    """rad/s [7]"""
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> "_Shown":
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Sight":
         return self
+
+
+def newest_sight(reception: Reception, config: HardwareCameraConfig, after: float) -> Sight | None:
+    """The newest picture sent later than `after`, s; None where there is none, or its arm is not known yet.
+
+    Raises ImageError for a picture that the camera's driver, as the scenario has it, cannot give.
+    """
+    message = reception.newest_picture(after)
+    if message is None:
+        return None
+    images = decode_images(message)
+    taken = images.time + reception.offset
+    arm = reception.state_at(taken - config.latency)
+    if arm is None:
+        return None
+    color, depth = as_drake_images(images, config)
+    return Sight(color, depth, taken, message.header.utime * 1e-6 + reception.offset, *arm)
 
 
 class LcmView(LeafSystem):
@@ -200,7 +220,7 @@ class LcmView(LeafSystem):
         super().__init__()
         self.set_name("drivers")
         self._config, self._reception, self._clock = config, reception, clock
-        nothing = _Shown(ImageRgba8U(), ImageDepth32F(), -1.0, -np.inf, np.zeros(7), np.zeros(7))
+        nothing = Sight(ImageRgba8U(), ImageDepth32F(), -1.0, -np.inf, np.zeros(7), np.zeros(7))
         self._state = self.DeclareAbstractState(Value[object](nothing))
         ticket = {self.abstract_state_ticket(self._state)}
         self.DeclareAbstractOutputPort(
@@ -220,7 +240,7 @@ class LcmView(LeafSystem):
         self.DeclareVectorOutputPort("velocity", 7, self._calc_velocity, ticket)
         self.DeclarePeriodicUnrestrictedUpdateEvent(1 / config.rate, 0.0, self._look)
 
-    def _shown(self, context: Context) -> _Shown:
+    def _shown(self, context: Context) -> Sight:
         return context.get_abstract_state(int(self._state)).get_value()
 
     def _calc_time(self, context: Context, output: BasicVector) -> None:
@@ -236,18 +256,10 @@ class LcmView(LeafSystem):
         shown = self._shown(context)
         if self._clock() - context.get_time() > 1 / self._config.rate:
             return EventStatus.DidNothing()
-        message = self._reception.newest_picture(after=shown.sent)
-        if message is None:
+        sight = newest_sight(self._reception, self._config, after=shown.sent)
+        if sight is None or sight.time <= shown.time:
             return EventStatus.DidNothing()
-        images = decode_images(message)
-        taken = images.time + self._reception.offset
-        arm = self._reception.state_at(taken - self._config.latency)
-        if arm is None or taken <= shown.time:
-            return EventStatus.DidNothing()
-        color, depth = as_drake_images(images, self._config)
-        sent = message.header.utime * 1e-6 + self._reception.offset
-        following = _Shown(color, depth, taken, sent, *arm)
-        state.get_mutable_abstract_state(int(self._state)).set_value(following)
+        state.get_mutable_abstract_state(int(self._state)).set_value(sight)
         return EventStatus.Succeeded()
 
 

@@ -16,7 +16,8 @@ from riseg_drake.stations.lcm_channels import LcmConfig
 
 POLL = 0.01
 """Time between two looks for messages, s. Waiting inside LCM would keep Python's lock, and looking more often
-would take it from the segmentation again and again; of the status one in ten is enough for a straight line."""
+would take it from the segmentation again and again. LCM keeps the first message of each channel that comes in
+between; of the status one in ten is enough for a straight line."""
 KEPT_PICTURES = 4
 """Undecoded pictures kept, half a megabyte each."""
 

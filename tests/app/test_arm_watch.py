@@ -76,13 +76,17 @@ def test_a_stream_that_has_ended_or_refuses_targets_is_the_end_of_the_run(monkey
     assert desk.progress.end == (refused or cause.value)
 
 
-def test_a_pause_is_told_once_and_needs_no_answer(monkeypatch):
+def test_a_pause_needs_no_answer_and_is_not_told_again_soon(monkeypatch):
     desk = Desk(monkeypatch)
-    for _ in range(3):
-        assert not desk.look(Mode.PAUSED, Cause.IMAGES_OLD)
-    desk.look()
-    desk.look(Mode.PAUSED, Cause.STATUS_OLD)
+    for cause in (Cause.IMAGES_OLD, Cause.IMAGES_OLD, Cause.STATUS_OLD):
+        for _ in range(3):
+            assert not desk.look(Mode.PAUSED, cause)
+        desk.look()
     assert desk.told == [f"paused: {cause.value}" for cause in (Cause.IMAGES_OLD, Cause.STATUS_OLD)]
+    assert desk.watch.pauses == 3
+    desk.now += ArmWatch.QUIET
+    desk.look(Mode.PAUSED, Cause.IMAGES_OLD)
+    assert len(desk.told) == 3
 
 
 def test_contact_is_announced_once_and_for_the_push_alone(monkeypatch):
