@@ -135,7 +135,8 @@ def _camera_process(scenario_file: Path | None, seed: int) -> Iterator[Connectio
 
 def _draw(commands: Connection, scenario_file: Path | None, seed: int) -> None:
     """The camera's process: draws where everything was said to be, and falls behind rather than late."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the other process's to hear
+    for end in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(end, signal.SIG_IGN)  # Ctrl-C is the other process's to hear
     os.nice(_GIVE_WAY)
     scenario = load_scenario(scenario_file)
     try:
