@@ -32,6 +32,10 @@ class StampedCommand:
     planned: float
     """The same by the steady clock, s."""
 
+    def is_in_time(self, steady: float) -> bool:
+        """Whether it may be sent at a time, s; else it is to be forgotten, and counts as a pause."""
+        return steady - self.planned <= LONGEST_PAUSE
+
 
 class PacedCommands:
     """A CommandStream on the clocks of the process that sends its commands; the clocks are given, not asked."""
@@ -60,10 +64,6 @@ class PacedCommands:
             self._followed, self._last = planned, None
             return None
         return StampedCommand(values, stamp, planned)
-
-    def is_in_time(self, command: StampedCommand, steady: float) -> bool:
-        """Whether a command may be sent at a time, s; else it is to be forgotten, and counts as a pause."""
-        return steady - command.planned <= LONGEST_PAUSE
 
     def was_sent(self, command: StampedCommand) -> None:
         """Take note of it: it is what the driver holds until the next."""

@@ -220,7 +220,7 @@ def stream_commands(
             stream.end(Cause.INTERRUPT)
         status = news.read()
         command = paced.next(time.monotonic(), time.time(), status, news.image_time)
-        if command is not None and paced.is_in_time(command, time.monotonic()):
+        if command is not None and command.is_in_time(time.monotonic()):
             message = command_message(command.values, parameters.mode, command.stamp)
             news.lcm.Publish(lcm.command_channel, message.encode())
             paced.was_sent(command)

@@ -77,7 +77,7 @@ def test_a_command_that_took_too_long_is_not_to_be_sent_and_counts_as_a_pause():
     client = Client().under_way()
     held = client.stream.position
     command = client.next(1.0)
-    assert client.paced.is_in_time(command, STEADY + 1.04)
-    assert not client.paced.is_in_time(command, STEADY + 1.06)
+    assert command.is_in_time(STEADY + 1.04)
+    assert not command.is_in_time(STEADY + 1.06)
     client.send(1.06)
     np.testing.assert_allclose(client.stream.position, held, atol=1e-4)

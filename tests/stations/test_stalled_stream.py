@@ -52,7 +52,7 @@ class Session:
         status = ArmStatus(WALL + self.now, self.driver.q_d, self.driver.v_d, np.zeros(7), MOVE)
         command = self.paced.next(STEADY + self.now, WALL + self.now, status, WALL)
         self.let(self.stalls["at work"])
-        if command is not None and self.paced.is_in_time(command, STEADY + self.now):
+        if command is not None and command.is_in_time(STEADY + self.now):
             self.paced.was_sent(command)
             if self.rng.random() >= self.lost:
                 self.driver.receive(command_message(command.values, self.mode, command.stamp))
