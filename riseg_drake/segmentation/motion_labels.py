@@ -22,10 +22,12 @@ from riseg_drake.segmentation.alignment import (
     edge_pixels,
     has_contrast,
 )
+from riseg_drake.segmentation.lighting import gray_costs
 from riseg_drake.segmentation.noise import MeasurementNoise, depth_sigma, gray_variance
 from riseg_drake.segmentation.potts import PottsGraph, potts_labels
 from riseg_drake.segmentation.superpixels import Superpixels, blank_surfaces, superpixels
 from riseg_drake.segmentation.surface import SurfacePixels, seek, surface_pixels
+from riseg_drake.segmentation.vacated import VacatedParameters, refute_motions
 
 _NO_EVIDENCE = np.float32(2)
 """The cost that is expected of a match."""
@@ -41,6 +43,9 @@ class MotionLabelParameters:
     """m on the object; size of the pieces that decide as one."""
     cost_max: float = 9.0
     """Squared normalised residuals count no more than that (occlusion, highlights)."""
+    relit: float = 1.0
+    """What it adds to a piece's squared residuals if the light on it is taken to have changed, as where a
+    shadow has come or gone."""
     correlated_pixels: float = 6.0
     """Noise of depth and flow is correlated over about so many pixels; they count as one."""
     border: float = 6.0
@@ -57,6 +62,7 @@ class MotionLabelParameters:
     squared residuals of its edges (gray and depth, 2 where a motion is right) are less than that,"""
     split_gain: float = 1.0
     """and if several motions do not explain them so much better."""
+    vacated: VacatedParameters = field(default_factory=VacatedParameters)
 
 
 @dataclass(frozen=True)
@@ -79,6 +85,10 @@ class ReferencePieces(Immutable):
     """[N], gray value of each witness."""
     variance: NDArray[np.float32]
     """[N], of the difference between that and where it should reappear."""
+    surface: SurfacePixels
+    """The witnesses and those on the rim: what leaves its place when it moves."""
+    surface_piece: NDArray[np.intp]
+    """Of each of these."""
     edges: EdgePixels
     """What sharpens the motions."""
     whole_edges: EdgePixels
@@ -108,15 +118,14 @@ def cut_pieces(
     whole[region] = pieces.label
     variance = gray_variance(reference.gray, noise)
     contrast = has_contrast(variance, noise)
-    surface = blank_surfaces(
-        pieces, parameters.surface_min * above_0.pixels_per_metre(reference.intrinsics) ** 2
-    )
-    wholes = [surface == number for number in range(int(surface.max(initial=-1)) + 1)]
+    blank = blank_surfaces(pieces, parameters.surface_min * above_0.pixels_per_metre(reference.intrinsics) ** 2)
+    wholes = [blank == number for number in range(int(blank.max(initial=-1)) + 1)]
     wholes += _pieces_of(known[region], pieces)
     # On the rim a pixel sees half of what is behind it: no motion explains that, least of all the right one.
     core = cv2.erode((whole >= 0).astype(np.uint8), _RIM, borderValue=0) > 0
     witnesses = surface_pixels(core, reference.depth, reference.intrinsics)
     v, u = witnesses.pixel
+    surface = surface_pixels(whole >= 0, reference.depth, reference.intrinsics)
     edges = edge_pixels(reference, whole, contrast, variance, wholes, parameters.alignment.pixels)
     on_whole = np.any(wholes, axis=0)[edges.piece] if wholes else np.zeros(len(edges.piece), bool)
     return ReferencePieces(
@@ -132,6 +141,8 @@ def cut_pieces(
         piece=whole[v, u],
         gray=reference.gray[v, u],
         variance=variance[v, u],
+        surface=surface,
+        surface_piece=whole[tuple(surface.pixel)],
         edges=edges,
         whole_edges=edges.subset(np.flatnonzero(on_whole)),
     )
@@ -167,13 +178,25 @@ def label_by_motion(
         [H, W], 1 + number of the motion; 0 for what stands still and for the table.
     """
     count = pieces.pieces.count
-    cost = motion_costs(pair, pieces, motions, depth_noise, parameters.cost_max)
+    cost = motion_costs(pair, pieces, motions, depth_noise, parameters.cost_max, parameters.relit)
     sums = np.array([np.bincount(pieces.piece, c, count) for c in cost], np.float32)
     unary = sums / np.float32(parameters.correlated_pixels)
     label = _fewest_labels(unary, pieces, parameters)
     if len(pieces.whole_edges.piece):
         edge_cost = edge_costs(pair, pieces.whole_edges, motions, depth_noise)
         _keep_whole(label, edge_cost, pieces.whole_edges, parameters)
+    label = refute_motions(
+        pair,
+        label,
+        pieces.pieces.label,
+        pieces.region,
+        pieces.pieces.borders,
+        pieces.surface,
+        pieces.surface_piece,
+        motions,
+        depth_noise,
+        parameters.vacated,
+    )
     out = np.zeros(pair.reference.depth.shape, np.int16)
     # The last entry is for what is in no piece, whose number is -1.
     out[pieces.region] = np.append(label, 0)[pieces.pieces.label]
@@ -232,11 +255,12 @@ def motion_costs(
     motions: NDArray[np.float64],
     depth_noise: float,
     cost_max: float,
+    relit: float,
 ) -> NDArray[np.float32]:
     """How badly standing still and each motion [G, 4, 4] explain the N witnesses of t-1, [1 + G, N].
 
     Squared residuals of gray value and of depth, normalised by their noise: 1 + 1 where a motion is
-    right, up to `cost_max` each where it is wrong.
+    right, up to `cost_max` each where it is wrong. Where the light has changed, `relit` more.
     """
     gray_1, depth_1 = pair.current.unhidden_gray, pair.current.unhidden_depth
     per_variance = 1 / pieces.variance
@@ -245,7 +269,15 @@ def motion_costs(
     for k, motion in enumerate((np.eye(4), *motions)):
         sought = seek(pieces.witnesses, pair.X_C1C0 @ motion)
         z_1 = sought.read(depth_1)
-        photometric = np.minimum((sought.read_between(gray_1) - pieces.gray) ** 2 * per_variance, ceiling)
+        photometric = gray_costs(
+            pieces.gray,
+            sought.read_between(gray_1),
+            per_variance,
+            pieces.piece,
+            pieces.pieces.count,
+            ceiling,
+            relit,
+        )
         sigma = depth_sigma(sought.depth, float(np.sqrt(2)) * depth_noise)
         geometric = np.minimum(((z_1 - sought.depth) / sigma) ** 2, ceiling)
         both = photometric + np.where(z_1 > 0, geometric, np.float32(1))

@@ -1,0 +1,109 @@
+"""What has moved away has left its place: depth refutes motions that only light has made.
+
+A shadow that wanders over an object, or a highlight on it, moves in the images as a body would, and no
+comparison of gray values tells it from one. Depth does: a body that has moved leaves room behind it,
+and where the surface still is, as far as depth can tell, nothing has gone. Nothing of it is in the paper.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components
+
+from riseg_drake.geometry.camera import Region
+from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.segmentation.noise import depth_sigma
+from riseg_drake.segmentation.surface import SurfacePixels, seek
+
+_NEXT = np.ones((3, 3), np.uint8)
+"""Pixels beside those of a part may be its own: pieces are cut at whole pixels."""
+
+
+@dataclass
+class VacatedParameters:
+    """When depth says that a part has not moved as it seems to have."""
+
+    area_min: float = 2.5e-5
+    """m^2 of left places in which depth was measured; fewer tell nothing."""
+    share: float = 0.75
+    """Of these, how many must show the surface that should have gone."""
+    sigmas: float = 3.0
+    """Standard deviations of depth within which a surface is still there."""
+
+
+def refute_motions(
+    pair: FramePair,
+    label: NDArray[np.intp],
+    piece_image: NDArray[np.intp],
+    region: Region,
+    borders: NDArray[np.intp],
+    witnesses: SurfacePixels,
+    piece: NDArray[np.intp],
+    motions: NDArray[np.float64],
+    depth_noise: float,
+    parameters: VacatedParameters,
+) -> NDArray[np.intp]:
+    """The labels without motions that depth refutes.
+
+    Each connected part with one label is asked: had it moved as its neighbours, or not at all, where
+    would it be now, and not where it seems to have gone? If its surface is there, it has.
+
+    Args:
+        pair: the frames of t-1 and t.
+        label: [pieces], 1 + number of the motion, 0 = stands still.
+        piece_image: [h, w], number of each pixel's piece at t-1, -1 = none, in a region of the view.
+        region: that region.
+        borders: [M, 2], pieces that touch.
+        witnesses: pixels of t-1 with depth, not on the rim of what stands there.
+        piece: [N], of each witness.
+        motions: [G, 4, 4] in C0.
+        depth_noise: standard deviation of depth at 1 m, m.
+        parameters: see there.
+    """
+    if not label.any():
+        return label
+    part, count = _parts(label, borders)
+    X = np.concatenate([np.eye(4)[None], motions])
+    focal_length, distance = pair.reference.intrinsics.fx, float(np.median(witnesses.depth))
+    pixels_min = parameters.area_min * (focal_length / distance) ** 2
+    own = np.zeros(pair.reference.depth.shape, np.uint8)
+    best = np.zeros(count)
+    out = label.copy()
+    for k in np.unique(label[label > 0]):
+        mine = np.flatnonzero(label[piece] == k)
+        own[region] = cv2.dilate(np.append(label == k, False)[piece_image].astype(np.uint8), _NEXT)
+        pixels = witnesses.subset(mine)
+        part_of = part[piece[mine]]
+        for other in _neighbours(label, borders, k):
+            # Where the other motion puts a point, its own part may be by now, from another place.
+            left = seek(pixels, np.linalg.inv(X[k]) @ X[other]).read(own) == 0
+            if np.count_nonzero(left) < pixels_min:
+                continue
+            sought = seek(pixels.subset(np.flatnonzero(left)), pair.X_C1C0 @ X[other])
+            z_1 = sought.read(pair.current.unhidden_depth)
+            sigma = depth_sigma(sought.depth, float(np.sqrt(2)) * depth_noise)
+            there = np.abs(z_1 - sought.depth) < parameters.sigmas * sigma
+            measured = np.bincount(part_of[left], z_1 > 0, count)
+            share = np.bincount(part_of[left], there & (z_1 > 0), count) / np.maximum(measured, 1)
+            refuted = (measured >= pixels_min) & (share >= parameters.share) & (share > best)
+            best[refuted] = share[refuted]
+            out[refuted[part]] = other
+    return out
+
+
+def _parts(label: NDArray[np.intp], borders: NDArray[np.intp]) -> tuple[NDArray[np.intp], int]:
+    """The connected part with one label that each piece [N] is of, and how many there are."""
+    same = borders[label[borders[:, 0]] == label[borders[:, 1]]]
+    graph = csr_matrix((np.ones(len(same)), (same[:, 0], same[:, 1])), shape=(len(label),) * 2)
+    count, part = connected_components(graph, directed=False)
+    return part, count
+
+
+def _neighbours(label: NDArray[np.intp], borders: NDArray[np.intp], k: int) -> list[int]:
+    """Standing still, and the labels across the borders of the pieces with label k."""
+    across = label[borders]
+    touching = across[(across == k).any(axis=1)]
+    return sorted({0, *map(int, touching.ravel())} - {int(k)})
