@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.pictures.masks import draw_masks
 from riseg_drake.evaluation.disturbance import Disturbance
 from riseg_drake.evaluation.scores import Scores
+from riseg_drake.pictures.masks import draw_masks
 from riseg_drake.recording.whole_file import write_png, write_text
 from riseg_drake.recording.writer import depth_to_millimetres
 

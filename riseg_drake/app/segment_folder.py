@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.app.output import SUMMARY, OutputError, to_json
-from riseg_drake.pictures.masks import draw_masks
 from riseg_drake.evaluation.scores import Scores
+from riseg_drake.pictures.masks import draw_masks
 from riseg_drake.recording.whole_file import write_png, write_text
 
 MASKS = "mask"
