@@ -74,8 +74,12 @@ def draw(diagram: Diagram) -> str:
             f'CELLPADDING="3"><TR><TD COLSPAN="2" BGCOLOR="{_color(system)}">'
             f"<B>{escape(system.get_name())}</B></TD></TR>{rows}</TABLE>>];"
         )
-    for (target, u), (source, y) in wires.items():
-        color = hex_color(WIRE_IDS[systems.index(source) % len(WIRE_IDS)])
+    # In the order of the systems: the map's own changes from one process to the next.
+    order = {system: k for k, system in enumerate(systems)}
+    for (target, u), (source, y) in sorted(
+        wires.items(), key=lambda wire: (order[wire[0][0]], int(wire[0][1]))
+    ):
+        color = hex_color(WIRE_IDS[order[source] % len(WIRE_IDS)])
         lines.append(f'{name[source]}:y{int(y)}:e -> {name[target]}:u{int(u)}:w [color="{color}"];')
     return "\n".join([*lines, "}"])
 

@@ -8,8 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from riseg_drake.pictures.object_colors import object_colors
+
 _STEADY = 6
 """Gray levels; a pixel that changes by less, in every channel, is left as it was: that is sensor noise."""
+_OBJECTS = 12
+"""So many objects have their colours exactly."""
 _SAMPLES = 24
 """Pictures that the palette is taken from."""
 _CAPTION = 26
@@ -60,10 +64,17 @@ def gif(pictures: Sequence[NDArray[np.uint8]], rate: float, last: float = 0.0) -
 
 
 def _palette(pictures: Sequence[NDArray[np.uint8]]) -> Image.Image:
-    """256 colours for all pictures. A colour counts by the root of its area: small things keep theirs."""
+    """256 colours for all pictures: the first objects' own, and of the rest those that are there.
+
+    A colour counts by the root of its area, so that not all are shades of the table.
+    """
     sample = np.stack(pictures[:: -(-len(pictures) // _SAMPLES)]) >> 3
     code = sample[..., 0].astype(np.int32) << 10 | sample[..., 1].astype(np.int32) << 5 | sample[..., 2]
     codes, count = np.unique(code, return_counts=True)
     colors = np.stack([codes >> 10, codes >> 5 & 31, codes & 31], axis=-1) * 8 + 4
     weighted = np.repeat(colors, np.ceil(np.sqrt(count)).astype(int), axis=0).astype(np.uint8)
-    return Image.fromarray(weighted[None]).quantize(256, Image.Quantize.MEDIANCUT)
+    others = 256 - _OBJECTS
+    found = Image.fromarray(weighted[None]).quantize(others, Image.Quantize.MEDIANCUT).getpalette() or []
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(object_colors(np.arange(1, _OBJECTS + 1)).ravel().tolist() + found[: 3 * others])
+    return palette

@@ -6,7 +6,9 @@ from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import ConstantVectorSource
 
 from riseg_drake.app.cli import main
+from riseg_drake.app.diagram import make_diagram
 from riseg_drake.app.drawing import MEMORY_COLOR, STAGE_COLOR, UNUSED_COLOR, draw
+from riseg_drake.app.scenario import load_scenario
 
 STAGES = ("ExpectedFlow", "OpticalFlow", "BFIFGrouper", "MaskPropagator", "PushPlanner", "ArmMotion")
 
@@ -46,10 +48,14 @@ def test_wires_ports_and_memory_can_be_told_from_the_drawing():
 
 
 @pytest.mark.renders
-def test_no_stage_is_wired_to_ground_truth(small_scenario):
-    from riseg_drake.app.diagram import make_diagram
-    from riseg_drake.app.scenario import load_scenario
+def test_the_same_diagram_gives_the_same_drawing(small_scenario):
+    scenario = load_scenario(small_scenario)
+    first, second = (make_diagram(scenario, seed=0) for _ in range(2))
+    assert draw(first.diagram) == draw(second.diagram)
 
+
+@pytest.mark.renders
+def test_no_stage_is_wired_to_ground_truth(small_scenario):
     diagram = make_diagram(load_scenario(small_scenario), seed=0).diagram
     sources = {
         (system.get_name(), system.get_output_port(index).get_name())

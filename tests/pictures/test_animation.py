@@ -5,6 +5,7 @@ import pytest
 from PIL import Image
 
 from riseg_drake.pictures.animation import gif, side_by_side
+from riseg_drake.pictures.object_colors import object_colors
 
 
 def frames_of(content):
@@ -17,7 +18,7 @@ def frames_of(content):
 def moving_square(count, noise=0.0):
     rng = np.random.default_rng(0)
     for k in range(count):
-        picture = np.full((40, 60, 3), 180.0)
+        picture = np.full((40, 60, 3), 184.0)  # noise crosses from one colour of the palette to the next
         picture[10:20, 3 * k : 3 * k + 10] = (230, 159, 0)
         yield np.clip(picture + noise * rng.uniform(-1, 1, picture.shape), 0, 255).astype(np.uint8)
 
@@ -35,13 +36,21 @@ def test_noise_does_not_flicker():
     assert all(np.array_equal(seen[25:], shown[0][25:]) for seen in shown)
 
 
-def test_a_small_thing_keeps_its_colour_beside_a_large_gradient():
-    picture = np.repeat(np.linspace(0, 255, 400).astype(np.uint8)[None, :, None], 300, axis=0) * np.ones(
-        3, np.uint8
-    )
-    picture[100:110, 100:110] = (204, 121, 167)
+def test_the_first_objects_have_their_own_colours_to_the_bit():
+    x, y = np.meshgrid(np.linspace(0, 255, 600), np.linspace(0, 200, 400))
+    picture = np.stack([x, y, 0.5 * x], axis=-1).astype(np.uint8)
+    picture[100, 100:112] = object_colors(np.arange(1, 13))
     ((seen, _),) = frames_of(gif([picture], 10))
-    assert np.abs(seen[105, 105] - (204, 121, 167)).max() <= 12
+    np.testing.assert_array_equal(seen[100, 100:112], object_colors(np.arange(1, 13)))
+
+
+def test_a_large_table_does_not_use_up_the_palette():
+    table = np.random.default_rng(0).normal(180, 12, (400, 600, 3))
+    x, y = np.meshgrid(np.linspace(0, 255, 40), np.linspace(0, 255, 40))
+    table[100:140, 100:140] = np.stack([x, y, 255 - x], axis=-1)
+    picture = table.clip(0, 255).astype(np.uint8)
+    ((seen, _),) = frames_of(gif([picture], 10))
+    assert np.abs(seen - picture)[100:140, 100:140].max(axis=-1).mean() < 30
 
 
 def test_the_last_picture_stays():
