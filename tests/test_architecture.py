@@ -8,6 +8,7 @@ PACKAGE = Path(__file__).parents[1] / "riseg_drake"
 FLOORS = {
     "geometry": 0,
     "robot": 1,
+    "pictures": 1,
     "segmentation": 2,
     "learned": 2,
     "pushing": 2,

@@ -223,6 +223,25 @@ def command_line() -> argparse.ArgumentParser:
     )
     _add_scenario(diagram)
     diagram.add_argument("--output", type=Path, metavar="FILE", help="a file that ends in .dot or .svg")
+
+    pictures = _add(
+        subparsers,
+        "pictures",
+        commands.pictures,
+        "Make the pictures of the documentation anew: one run as a GIF and as a strip, the wired diagrams.\n"
+        "With --evaluation also the figure of an evaluation.",
+    )
+    _add_scenario(pictures)
+    pictures.add_argument("--seed", type=int, default=4, metavar="N", help="draws the scene and the noise (4)")
+    pictures.add_argument(
+        "--output", type=Path, default=Path("out/pictures"), metavar="DIR", help="folder (out/pictures)"
+    )
+    pictures.add_argument(
+        "--evaluation",
+        type=Path,
+        metavar="DIR",
+        help="output folder of `riseg evaluate`, to take its figure from",
+    )
     return parser
 
 

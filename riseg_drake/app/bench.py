@@ -6,31 +6,21 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import Context
 from rich.console import Console
 
-from riseg_drake.app.diagram import make_diagram
 from riseg_drake.app.graphics import require_graphics
-from riseg_drake.app.interactions import Progress, interactions
 from riseg_drake.app.output import stage_figures
+from riseg_drake.app.recorded_push import StationOutputs, push_images, put_through
 from riseg_drake.app.run import peak_memory_mb
 from riseg_drake.app.scenario import Scenario, load_scenario
-from riseg_drake.app.scenario_file import ScenarioError
-from riseg_drake.app.segmentation_block import STATION_PORTS, make_segmentation, panda_view
+from riseg_drake.app.segmentation_block import make_segmentation, panda_view
 from riseg_drake.app.tables import stage_table
-from riseg_drake.geometry.rgbd import Frame
-from riseg_drake.pushing.push import ArmPhase
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.systems.stage_clock import StageClock
 
 REPETITIONS = 4
 """How often the push is gone through for times."""
 WHOLE = "whole pair"
-
-
-StationOutputs = dict[str, Any]
-"""What a station gave at one tick of the camera, by the names of the segmentation's inputs."""
 
 
 def bench_command(scenario_file: Path | None, seed: int, stream: int | None, console: Console) -> None:
@@ -71,25 +61,6 @@ def bench_command(scenario_file: Path | None, seed: int, stream: int | None, con
     )
 
 
-def push_images(scenario: Scenario, seed: int) -> list[StationOutputs]:
-    """The station's outputs at every frame of the first push. Raises ScenarioError if there is none."""
-    wired = make_diagram(scenario, seed)
-    progress = Progress()
-    images: list[StationOutputs] = []
-
-    def keep(_: Frame, context: Context) -> None:
-        if wired.phase(context) is ArmPhase.PUSH:
-            images.append({name: wired.copy(port, context) for name, port in STATION_PORTS.items()})
-        elif images:
-            progress.end = "the push is over"
-
-    for _ in interactions(wired, StageClock(), progress, scenario.longest, (keep,)):
-        pass
-    if len(images) < 2:
-        raise ScenarioError(f"with seed {seed} the arm finds nothing to push; choose another seed")
-    return images
-
-
 class _StageMemory(StageClock):
     """Books the peak of the memory that Python objects and arrays take in each call, bytes."""
 
@@ -118,15 +89,10 @@ def _segment(scenario: Scenario, images: Sequence[StationOutputs], clock: StageC
     period = 1 / scenario.station.camera.rate
     view = panda_view(scenario, PandaKinematics(scenario.station.panda))
     diagram, stages = make_segmentation(scenario, view, period, seed=0)
-    simulator = Simulator(diagram)
-    context = simulator.get_mutable_context()
-    for tick, now in enumerate(images):
-        for name, value in now.items():
-            diagram.GetInputPort(name).FixValue(context, value)
-        if tick == 0:  # the first frame has no partner, and fills what is computed once for all
-            simulator.AdvanceTo(period)
-            clock.watch(stages)
-            continue
+    after_each = put_through(diagram, images, period)
+    next(after_each)  # the first frame has no partner, and fills what is computed once for all
+    clock.watch(stages)
+    for _ in images[1:]:
         start = perf_counter()
-        simulator.AdvanceTo((tick + 1) * period)
+        next(after_each)
         clock.seconds[WHOLE].append(perf_counter() - start)

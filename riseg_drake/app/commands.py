@@ -115,3 +115,10 @@ def diagram(chosen: argparse.Namespace, console: Console) -> None:
     from riseg_drake.app.drawing import diagram_command
 
     diagram_command(chosen.scenario, chosen.output, console)
+
+
+def pictures(chosen: argparse.Namespace, console: Console) -> None:
+    """`riseg pictures`."""
+    from riseg_drake.app.pictures_command import pictures_command
+
+    pictures_command(chosen.scenario, chosen.seed, chosen.output, chosen.evaluation, console)

@@ -13,9 +13,9 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.perception import BaseField, Fields, PointCloud
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
-from riseg_drake.app.overlay import object_colors
 from riseg_drake.geometry.camera import back_project
 from riseg_drake.geometry.rgbd import Frame, FramePair
+from riseg_drake.pictures.object_colors import object_colors
 from riseg_drake.pushing.push import Push
 from riseg_drake.segmentation.segment import Segmentation
 

@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.app.overlay import draw_overlay
 from riseg_drake.evaluation.disturbance import Disturbance
 from riseg_drake.evaluation.scores import Scores
+from riseg_drake.pictures.masks import draw_masks
 from riseg_drake.recording.whole_file import write_png, write_text
 from riseg_drake.recording.writer import depth_to_millimetres
 
@@ -96,7 +96,7 @@ class RunFolder:
         write_png(unfinished / "color.png", step.color)
         write_png(unfinished / "depth.png", depth_to_millimetres(step.depth))
         write_png(unfinished / "mask.png", step.mask.astype(np.uint16))
-        write_png(unfinished / "overlay.png", draw_overlay(step.color, step.mask))
+        write_png(unfinished / "overlay.png", draw_masks(step.color, step.mask))
         if step.ground_truth is not None:
             write_png(unfinished / "ground_truth.png", step.ground_truth.astype(np.uint16))
         unfinished.rename(self.path / name)

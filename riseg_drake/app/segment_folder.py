@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.app.output import SUMMARY, OutputError, to_json
-from riseg_drake.app.overlay import draw_overlay
 from riseg_drake.evaluation.scores import Scores
+from riseg_drake.pictures.masks import draw_masks
 from riseg_drake.recording.whole_file import write_png, write_text
 
 MASKS = "mask"
@@ -69,7 +69,7 @@ class SegmentFolder:
                 self._write_scores(file, scores)
         except OSError as error:
             raise OutputError(f"cannot write to {self.path}: {error.strerror}") from None
-        self._show(draw_overlay(color, mask))
+        self._show(draw_masks(color, mask))
 
     def note(self, **entries: Any) -> None:
         """Enter something in the summary."""

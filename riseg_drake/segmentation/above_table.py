@@ -21,6 +21,8 @@ from riseg_drake.segmentation.table_extent import off_table
 
 _COLOR_SPREAD_MIN = 4.0
 """Gray levels; a table's colour is not known better than that."""
+_DEPTH_NOISE_MIN = 2.0e-4
+"""m at 1 m; a rendered depth without noise is taken for no better than that: pixels still are of some size."""
 _TABLE_SIGMAS = 4.0
 """A colour further than that many standard deviations from the table's, in any channel, is not the table's."""
 
@@ -109,7 +111,7 @@ def _depth_noise(
         return parameters.plane.depth_noise
     h, z = height[_every(5)][on_table], depth[_every(5)][on_table]
     # Not by a median: depth in whole millimetres makes it 0 on a table that faces the camera.
-    return float(np.sqrt(np.mean((h / z**2) ** 2)))
+    return max(float(np.sqrt(np.mean((h / z**2) ** 2))), _DEPTH_NOISE_MIN)
 
 
 def _looks_like_table(color: NDArray[np.uint8], frame: Frame, on_table: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -2,9 +2,9 @@ import numpy as np
 from pydrake.geometry import Meshcat
 
 from riseg_drake.app.meshcat_view import POINT_STRIDE, draw_arrow, object_cloud
-from riseg_drake.app.overlay import object_colors
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.pictures.object_colors import object_colors
 from riseg_drake.pushing.push import Push
 
 INTRINSICS = Intrinsics(30, 30, 30.0, 30.0, 15.0, 15.0)

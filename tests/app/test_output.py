@@ -70,7 +70,7 @@ def test_a_step_that_was_cut_off_is_not_listed_and_not_there(tmp_path, monkeypat
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("riseg_drake.app.output.draw_overlay", stop)
+    monkeypatch.setattr("riseg_drake.app.output.draw_masks", stop)
     with pytest.raises(KeyboardInterrupt):
         output.write_step(step(1))
     assert [entry["step"] for entry in summary(tmp_path)["steps"]] == [0]

@@ -1,5 +1,7 @@
 """objMask on drawn depth: what stands there is found, and neither the table nor the robot."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,13 @@ def test_depth_noise_is_read_off_the_table_within_30_percent(noise: float) -> No
     frame, _ = scene.frame(0, looking_down(tilt=0.1), PLACES, np.random.default_rng(3))
     above = objects_above_table(frame, AboveTableParameters())
     assert above.depth_noise == pytest.approx(noise, rel=0.3)
+
+
+def test_depth_without_any_noise_is_not_believed_without_end() -> None:
+    scene = DrawnScene([], depth_noise=0.0)
+    frame, _ = scene.frame(0, looking_down(), [], np.random.default_rng(3))
+    flat = replace(frame, depth=np.full_like(frame.depth, 0.45))
+    assert objects_above_table(flat, AboveTableParameters()).depth_noise > 0
 
 
 def test_a_table_that_shows_in_a_third_of_the_image_is_enough() -> None:

@@ -1,0 +1,58 @@
+"""One push, held in memory: what the station gave at every picture, to be put through Alg. 2 again."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, Diagram
+
+from riseg_drake.app.diagram import make_diagram
+from riseg_drake.app.interactions import Progress, interactions
+from riseg_drake.app.scenario import Scenario
+from riseg_drake.app.scenario_file import ScenarioError
+from riseg_drake.app.segmentation_block import STATION_PORTS
+from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.pushing.push import ArmPhase
+from riseg_drake.systems.stage_clock import StageClock
+
+StationOutputs = dict[str, Any]
+"""What a station gave at one tick of the camera, by the names of the segmentation's inputs."""
+
+
+def push_images(scenario: Scenario, seed: int) -> list[StationOutputs]:
+    """The station's outputs at every frame of the first push. Raises ScenarioError if there is none."""
+    wired = make_diagram(scenario, seed)
+    progress = Progress()
+    images: list[StationOutputs] = []
+
+    def keep(_: Frame, context: Context) -> None:
+        if wired.phase(context) is ArmPhase.PUSH:
+            images.append({name: wired.copy(port, context) for name, port in STATION_PORTS.items()})
+        elif images:
+            progress.end = "the push is over"
+
+    for _ in interactions(wired, StageClock(), progress, scenario.longest, (keep,)):
+        pass
+    if len(images) < 2:
+        raise ScenarioError(f"with seed {seed} the arm finds nothing to push; choose another seed")
+    return images
+
+
+def put_through(segmentation: Diagram, images: Sequence[StationOutputs], period: float) -> Iterator[Context]:
+    """Put images through Alg. 2, one tick of the camera each, as fast as it goes.
+
+    Args:
+        segmentation: see `make_segmentation`.
+        images: what comes in at every tick.
+        period: of the ticks, s.
+
+    Yields:
+        The diagram's context after each: what its ports say then is about that image.
+    """
+    simulator = Simulator(segmentation)
+    context = simulator.get_mutable_context()
+    for tick, now in enumerate(images):
+        for name, value in now.items():
+            segmentation.GetInputPort(name).FixValue(context, value)
+        simulator.AdvanceTo((tick + 1) * period)
+        yield context

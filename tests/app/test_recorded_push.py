@@ -1,0 +1,31 @@
+import numpy as np
+import pytest
+
+from riseg_drake.app.recorded_push import push_images, put_through
+from riseg_drake.app.scenario import load_scenario
+from riseg_drake.app.scenario_file import ScenarioError
+from riseg_drake.app.segmentation_block import make_segmentation, panda_view
+from riseg_drake.robot.kinematics import PandaKinematics
+
+pytestmark = pytest.mark.renders
+
+
+def test_each_image_goes_through_once_and_the_ports_speak_of_it(small_scenario):
+    scenario = load_scenario(small_scenario)
+    images = push_images(scenario, seed=1)
+    period = 1 / scenario.station.camera.rate
+    view = panda_view(scenario, PandaKinematics(scenario.station.panda))
+    segmentation, _ = make_segmentation(scenario, view, period, seed=0)
+    times, masks = [], []
+    for context in put_through(segmentation, images, period):
+        times.append(segmentation.GetOutputPort("pair").Eval(context).current.time)
+        masks.append(segmentation.GetOutputPort("mask").Eval(context))
+    np.testing.assert_allclose(times, [float(now["image_time"][0]) for now in images])
+    assert masks[-1].any()
+
+
+def test_a_scene_without_a_push_is_one_line_that_says_so(small_scenario):
+    scenario = load_scenario(small_scenario)
+    scenario.arm.most_interactions = 0
+    with pytest.raises(ScenarioError, match="choose another seed"):
+        push_images(scenario, seed=1)
