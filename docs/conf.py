@@ -1,0 +1,59 @@
+"""How Sphinx builds the site: `sphinx-build -W --keep-going docs out/site`."""
+
+import re
+from typing import Any
+
+from sphinx.application import Sphinx
+from sphinx.ext.napoleon import Config, GoogleDocstring
+
+project = "riseg_drake"
+author = "the riseg_drake developers"
+html_title = "riseg_drake"
+
+extensions = [
+    "myst_parser",  # the pages are Markdown, and read the same on a code host
+    "sphinx.ext.apidoc",  # a page of docstrings for every module
+    "sphinx.ext.autodoc",
+]
+exclude_patterns = ["README.md"]  # index.rst is that page, and the list of all others
+html_theme = "furo"
+html_show_sphinx = False
+html_show_copyright = False
+
+# Links to headings, such as systems.md#pushplanner, work as they do on a code host.
+myst_heading_anchors = 3
+
+apidoc_modules = [
+    {
+        "path": "../riseg_drake",
+        "destination": "api",
+        "module_first": True,
+        "separate_modules": True,
+        "automodule_options": {"members", "show-inheritance"},
+    }
+]
+autodoc_member_order = "bysource"
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+autodoc_mock_imports = ["torch", "transformers"]  # both are optional
+
+# Docstrings say `mask` where reStructuredText has ``mask``.
+default_role = "code"
+
+SECTIONS = Config(napoleon_custom_sections=[("Inputs", "params_style"), ("Outputs", "params_style")])
+CODE_OR_BAR = re.compile(r"(`[^`]*`)|\|")
+
+
+def as_restructured_text(
+    app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]
+) -> None:
+    """Rewrites a docstring in place: "Args:" and its like become lists, and |x| is no substitution."""
+    lines[:] = [CODE_OR_BAR.sub(lambda found: found[1] or r"\|", line) for line in lines]
+    # What stands before a colon in an attribute's docstring would be taken for its type.
+    if what not in ("attribute", "data", "property"):
+        lines[:] = GoogleDocstring(lines, SECTIONS, app, what, name, thing, options).lines()
+
+
+def setup(app: Sphinx) -> None:
+    """Called by Sphinx."""
+    app.connect("autodoc-process-docstring", as_restructured_text)
