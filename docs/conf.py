@@ -44,9 +44,7 @@ SECTIONS = Config(napoleon_custom_sections=[("Inputs", "params_style"), ("Output
 CODE_OR_BAR = re.compile(r"(`[^`]*`)|\|")
 
 
-def as_restructured_text(
-    app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]
-) -> None:
+def as_restructured_text(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
     """Rewrites a docstring in place: "Args:" and its like become lists, and |x| is no substitution."""
     lines[:] = [CODE_OR_BAR.sub(lambda found: found[1] or r"\|", line) for line in lines]
     # What stands before a colon in an attribute's docstring would be taken for its type.
