@@ -41,6 +41,7 @@ autodoc_mock_imports = ["torch", "transformers"]  # both are optional
 default_role = "code"
 
 SECTIONS = Config(napoleon_custom_sections=[("Inputs", "params_style"), ("Outputs", "params_style")])
+ARRAY = re.compile(r"ndarray\[tuple\[Any, \.\.\.\], dtype(?:\[_ScalarT\]|(\[\w+\]))\]")
 CODE_OR_BAR = re.compile(r"(`[^`]*`)|\|")
 
 
@@ -52,6 +53,16 @@ def as_restructured_text(app: Sphinx, what: str, name: str, thing: Any, options:
         lines[:] = GoogleDocstring(lines, SECTIONS, app, what, name, thing, options).lines()
 
 
+def with_short_arrays(
+    app: Sphinx, what: str, name: str, thing: Any, options: Any, signature: str | None, returns: str | None
+) -> tuple[str | None, str | None]:
+    """NDArray[float64] as the code says it, not as numpy spells it out."""
+    return tuple(
+        text and ARRAY.sub(lambda found: f"NDArray{found[1] or ''}", text) for text in (signature, returns)
+    )
+
+
 def setup(app: Sphinx) -> None:
     """Called by Sphinx."""
     app.connect("autodoc-process-docstring", as_restructured_text)
+    app.connect("autodoc-process-signature", with_short_arrays)

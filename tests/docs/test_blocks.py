@@ -100,7 +100,7 @@ NOT_EXECUTED = {
     "python": "its modules and tests are looked up",
     "ruff": "is a check of its own",
     "mypy": "is a check of its own",
-    "sphinx-build": "tests/docs/test_site.py builds the site",
+    "sphinx-build": ".ci/run builds the site",
     "pre-commit": "tests/docs/test_contributing.py compares its hooks with .ci/run",
     "lcm-logger": "a program of LCM's",
     "lcm-logplayer": "a program of LCM's",

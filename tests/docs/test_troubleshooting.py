@@ -2,6 +2,7 @@
 
 import ctypes
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -135,6 +136,11 @@ DRAWS = {somebody_elses_folder}
 """First asks whether images can be drawn."""
 
 
+def without_shares(text):
+    """How many percent of the points lie on the best plane is no matter here."""
+    return re.sub(r"\b\d+%", "N%", text)
+
+
 @pytest.mark.parametrize(
     ("quoted", "provoke"),
     [pytest.param(*each, marks=[pytest.mark.renders] * (each[1] in DRAWS)) for each in PROVOKED.items()],
@@ -146,7 +152,7 @@ def test_a_message_is_what_the_program_says(quoted, provoke, tmp_path, monkeypat
         provoke(patch)
     said = capsys.readouterr()
     whole = " ".join((said.out + said.err).split())
-    assert quoted in whole
+    assert without_shares(quoted) in without_shares(whole)
 
 
 SIDE = 0.06
