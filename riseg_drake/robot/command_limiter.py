@@ -29,7 +29,7 @@ from riseg_drake.robot.limits import PANDA_LIMITS, PandaLimits
 
 @dataclass
 class CommandLimits:
-    """Shares of the published limits of the joints that commands may use."""
+    """Shares of the published limits of the joints that commands may use, more than 0 and at most 1."""
 
     velocity: float = 0.4
     acceleration: float = 0.4
@@ -71,6 +71,7 @@ class CommandLimiter:
     """The trajectory of the commands, advanced by one period at a time. Knows no clock.
 
     `position`, `velocity`, `acceleration` are where it is now, each [7]; it begins at rest.
+    A period is 0.005 s if nothing else is said.
     """
 
     BANDWIDTH = 60.0
