@@ -12,7 +12,7 @@ html_title = "riseg_drake"
 
 extensions = [
     "myst_parser",  # the pages are Markdown, and read the same on a code host
-    "sphinx.ext.apidoc",  # a page of docstrings for every module
+    "sphinx.ext.apidoc",  # a page of docstrings for every room
     "sphinx.ext.autodoc",
 ]
 exclude_patterns = ["README.md"]  # index.rst is that page, and the list of all others
@@ -28,7 +28,7 @@ apidoc_modules = [
         "path": "../riseg_drake",
         "destination": "api",
         "module_first": True,
-        "separate_modules": True,
+        "separate_modules": False,
         "automodule_options": {"members", "show-inheritance"},
     }
 ]
