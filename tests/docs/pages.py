@@ -54,19 +54,32 @@ def code_spans(page: Path) -> Iterator[str]:
                 yield " ".join(child.content.split())
 
 
+SHELL_WORDS = {"do", "done", "then", "fi", "else"}
+"""They begin a command without being its name."""
+
+
 def commands(block: Block) -> list[list[str]]:
-    """The words of each command of a bash block, without comments."""
+    """The words of each command of a bash block, without comments and assignments.
+
+    Of a loop one round is taken: a variable has the first value that `for` gives it.
+    """
     found: list[list[str]] = []
+    variables: dict[str, str] = {}
     for line in block.text.replace("\\\n", " ").splitlines():
         lexer = shlex.shlex(line, posix=True, punctuation_chars="&|;")
         lexer.whitespace_split, lexer.commenters = True, "#"
         words: list[str] = []
         for word in [*lexer, ";"]:
-            if set(word) <= set("&|;"):
-                found += [words] if words else []
-                words = []
-            else:
-                words.append(word)
+            if not set(word) <= set("&|;"):
+                words.append(re.sub(r"\$(\w+)", lambda name: variables.get(name[1], name[0]), word))
+                continue
+            while words and (words[0] in SHELL_WORDS or re.match(r"\w+=", words[0])):
+                del words[0]
+            if words[:1] == ["for"]:
+                variables[words[1]] = words[3]
+            elif words:
+                found.append(words)
+            words = []
     return found
 
 
