@@ -1,6 +1,7 @@
 """How Sphinx builds the site: `sphinx-build -W --keep-going docs out/site`."""
 
 import re
+from inspect import isfunction
 from typing import Any
 
 from sphinx.application import Sphinx
@@ -62,7 +63,13 @@ def with_short_arrays(
     )
 
 
+def is_made_elsewhere(app: Sphinx, what: str, name: str, thing: Any, skip: bool, options: Any) -> bool | None:
+    """Whether a function comes from another project, as the `set` that matplotlib gives its subclasses does."""
+    return True if isfunction(thing) and not thing.__module__.startswith(project) else None
+
+
 def setup(app: Sphinx) -> None:
     """Called by Sphinx."""
     app.connect("autodoc-process-docstring", as_restructured_text)
     app.connect("autodoc-process-signature", with_short_arrays)
+    app.connect("autodoc-skip-member", is_made_elsewhere)
