@@ -1,23 +1,25 @@
 import ast
+import re
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
 
+from riseg_drake.app.diagram import make_diagram
+from riseg_drake.app.scenario import HARDWARE, load_scenario
+from tests.docs.pages import section, table_rows
+
 PACKAGE = Path(__file__).parents[1] / "riseg_drake"
 
+PAGE = Path(__file__).parents[1] / "docs" / "architecture.md"
+
 FLOORS = {
-    "geometry": 0,
-    "robot": 1,
-    "pictures": 1,
-    "segmentation": 2,
-    "learned": 2,
-    "pushing": 2,
-    "evaluation": 2,
-    "recording": 2,
-    "systems": 3,
-    "stations": 4,
-    "app": 5,
+    name: int(floor)
+    for floor, names in re.findall(r"^floor (\d+) +(.*)$", PAGE.read_text(), re.M)
+    for name in names.split()
 }
+"""As the page draws them."""
+
 FILES = [path for path in sorted(PACKAGE.rglob("*.py")) if path.parent != PACKAGE]
 NOT_A_NOUN = {"utils", "util", "common", "helpers", "helper", "misc", "tools", "lib"}
 LONGEST = 350
@@ -42,8 +44,33 @@ def imports(path):
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
-def test_every_room_has_its_floor():
+def words(cell):
+    return set(re.findall(r"`(\w+)`", cell))
+
+
+def test_every_room_has_its_floor_in_the_drawing():
     assert {room(path) for path in FILES} == set(FLOORS)
+    assert set(FLOORS.values()) == set(range(6))
+
+
+def test_the_table_says_what_each_room_imports():
+    real = defaultdict(set)
+    for path in FILES:
+        for module in imports(path):
+            other = module.removeprefix("riseg_drake.").split(".")[0]
+            if module.startswith("riseg_drake.") and other in FLOORS and other != room(path):
+                real[room(path)].add(other)
+    rows = table_rows(section(PAGE, "The rooms"))
+    assert {row[0].strip("`"): words(row[1]) for row in rows} == {name: real[name] for name in FLOORS}
+
+
+def test_the_table_says_who_hears_whom_in_the_diagram():
+    wired = make_diagram(load_scenario(None, HARDWARE), seed=0).diagram
+    real = defaultdict(set)
+    for (to, _), (source, _) in wired.connection_map().items():
+        real[to.get_name()].add(source.get_name())
+    rows = table_rows(section(PAGE, "The wiring"))
+    assert {row[0].strip("`"): words(row[1]) for row in rows} == real
 
 
 @pytest.mark.parametrize("path", FILES, ids=name)
@@ -93,4 +120,4 @@ def test_the_floor_of_geometry_stands_on_libraries_of_arrays_and_images_alone():
 def test_the_test_rooms_mirror_the_package():
     tests = Path(__file__).parent
     rooms = {path.name for path in tests.iterdir() if path.is_dir() and path.name[0] not in "._"}
-    assert rooms <= {*FLOORS, "models"}
+    assert rooms <= {*FLOORS, "docs", "models"}

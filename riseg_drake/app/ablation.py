@@ -49,7 +49,7 @@ def versions() -> dict[str, Switch]:
 
 
 def switched(scenario: Scenario, switch: Switch) -> Scenario:
-    """A copy of a scenario with some of its keys (`bfif.frames.kind`) set otherwise."""
+    """A copy of a scenario with some keys (`bfif.frames.kind`) set otherwise; ValueError for a strange one."""
     other = copy.deepcopy(scenario)
     for path, value in switch.items():
         *rooms, key = path.split(".")
@@ -68,6 +68,9 @@ def ablate(scenario: Scenario, seed: int, recording: Path, times: Sequence[float
         seed: of the recorded run.
         recording: its folder, with joint angles and true labels.
         times: of the frames to score, s, in rising order: the steps of the run.
+
+    Raises:
+        RecordingError: a frame of these times, or its true labels, are missing.
     """
     kinematics = PandaKinematics(scenario.station.panda)
     replays = {

@@ -25,7 +25,7 @@ edge [penwidth=1.4, arrowsize=0.7];"""
 
 
 def diagram_command(scenario_file: Path | None, output: Path | None, console: Console) -> None:
-    """Draw the diagram of a scenario to a .dot or .svg file, or as DOT to the terminal."""
+    """Draw the diagram of a scenario to a .dot or .svg file, or as DOT to the terminal. Raises OutputError."""
     if output is not None:
         _check_output(output)
     scenario = load_scenario(scenario_file)

@@ -41,7 +41,10 @@ def emulate_command(
     say: str | None,
     console: Console,
 ) -> None:
-    """Behave as the drivers do until Ctrl-C; or, with `say`, tell a running emulator a word."""
+    """Behave as the drivers do until Ctrl-C; or, with `say`, tell a running emulator a word.
+
+    Raises ScenarioError for a scene or settings that cannot be, WordError for an unknown word.
+    """
     scenario = load_scenario(scenario_file)
     config = scenario.emulator
     for word in [*faults, *([say] if say else [])]:

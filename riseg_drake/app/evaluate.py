@@ -48,7 +48,10 @@ def evaluate_command(
     masks: Sequence[str],
     console: Console,
 ) -> None:
-    """Run what is missing of an evaluation, then write its report."""
+    """Run what is missing of an evaluation, then write its report.
+
+    Raises EvaluationError where every scene failed, and OutputError for a folder that holds something else.
+    """
     scenario = load_scenario(scenario_file)
     if objects is not None:
         scenario.simulated.scene.objects = str(objects.resolve())

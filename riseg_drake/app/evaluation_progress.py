@@ -22,7 +22,7 @@ class EvaluationProgress:
         )
 
     def tell(self, scene: SceneResult, seconds: float) -> None:
-        """A scene is over."""
+        """A scene is over; it took so many seconds."""
         (task,) = self._progress.tasks
         self._progress.update(self._bar, advance=1, at=task.elapsed or 0.0)
         if scene.failure:

@@ -17,7 +17,10 @@ class OpticalFlowParameters:
 
 
 def flow_method(parameters: OpticalFlowParameters) -> FlowMethod:
-    """The method, ready to be used. Raises ModelError where RAFT lacks torch, weights or device."""
+    """The method, ready to be used.
+
+    Raises ModelError where RAFT lacks torch, weights or device, and ValueError for an unknown kind.
+    """
     if parameters.kind == "raft":
         return load_raft_flow(parameters.raft)
     if parameters.kind != "dis":

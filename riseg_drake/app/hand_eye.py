@@ -28,7 +28,7 @@ SLOWER = 0.3
 
 
 def hand_eye_command(scenario_file: Path | None, output: Path | None, yes: bool, console: Console) -> None:
-    """Move, compare the flows, print the verdict, and leave pictures."""
+    """Move, compare the flows, print the verdict, and leave pictures. Raises HardwareError."""
     scenario = load_scenario(scenario_file, HARDWARE)
     config = scenario.hardware
     check_limits(scenario)

@@ -111,7 +111,10 @@ def listening(
 
 
 def wait_for_drivers(reception: Reception, config: HardwareStationConfig, patience: float = PATIENCE) -> None:
-    """Return when both have been heard. Raises HardwareError, and ImageError for pictures of a wrong kind."""
+    """Return when both have been heard.
+
+    Raises HardwareError after `patience`, s, and ImageError for pictures of a wrong kind.
+    """
     deadline = time.monotonic() + patience
     while time.monotonic() < deadline:
         if reception.status is not None and reception.pictures:

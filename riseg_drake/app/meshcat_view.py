@@ -32,7 +32,7 @@ class MeshcatView(LeafSystem):
     """Draws the point cloud coloured by object id, and the push that is under way as an arrow.
 
     Inputs: `pair` (FramePair), `segmentation` (Segmentation), `active_push` (Push or None),
-    `interaction_step` (int).
+    `interaction_step` (int). Looks every `period` s.
     """
 
     def __init__(self, meshcat: Meshcat, period: float):
@@ -80,7 +80,7 @@ class MeshcatView(LeafSystem):
 
 
 def object_cloud(frame: Frame, mask: NDArray) -> PointCloud:
-    """The frame's points in W: objects in the colours of their ids, all else as the camera saw it."""
+    """The frame's points in W, by its mask [H, W] in the colours of object ids, else as the camera saw them."""
     stride = (slice(None, None, POINT_STRIDE), slice(None, None, POINT_STRIDE))
     p_CQ = back_project(frame.depth, frame.intrinsics)[stride].reshape(-1, 3)
     ids = mask[stride].ravel()

@@ -50,7 +50,7 @@ class Onlooker:
 
 
 def looking_at(eye_W: NDArray, target_W: NDArray) -> RigidTransform:
-    """X_WC of a camera at `eye_W` that looks at `target_W`, the world's z up in its image."""
+    """X_WC of a camera at `eye_W` [3] that looks at `target_W` [3], the world's z up in its image."""
     ahead = (target_W - eye_W) / np.linalg.norm(target_W - eye_W)
     right = np.cross(ahead, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)

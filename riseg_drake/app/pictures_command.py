@@ -38,7 +38,7 @@ STRIP_GAP, STRIP_MARGIN = 5, 30
 def pictures_command(
     scenario_file: Path | None, seed: int, output: Path, evaluation: Path | None, console: Console
 ) -> None:
-    """Make the pictures of a run, of the wired diagrams and of an evaluation."""
+    """Make the pictures of a run, of the wired diagrams and of an evaluation. Raises OutputError."""
     scenario = load_scenario(scenario_file)
     _ = scenario.simulated  # says so where it is not
     require_graphics()

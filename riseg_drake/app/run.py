@@ -123,7 +123,10 @@ def _objects(number: int) -> str:
 
 @contextmanager
 def state_of(folder: RunFolder, progress: Progress, steps: list[Step]) -> Iterator[None]:
-    """Enter in the summary how the run ended, also where it was stopped or failed."""
+    """Enter in the summary how the run ended, also where it was stopped or failed.
+
+    A KeyboardInterrupt is raised again, with what it left.
+    """
     start = perf_counter()
 
     def finish(state: str, end: str) -> None:

@@ -36,7 +36,7 @@ def read_scenario(path: Path, schema: type[Schema]) -> Schema:
 
 
 def parse_scenario(text: str, schema: type[Schema], source: str) -> Schema:
-    """The same for a text; `source` names it in errors."""
+    """The same for a text; `source` names it in errors. Raises ScenarioError."""
     try:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.MarkedYAMLError as error:

@@ -40,6 +40,7 @@ class SceneOutcome:
     failure: str
     """In one line; empty if all went well."""
     seconds: float
+    """How long it took, s."""
 
 
 def work_on(task: SceneTask) -> SceneOutcome:

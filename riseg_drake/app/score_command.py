@@ -15,7 +15,10 @@ MOST_ROWS = 20
 
 
 def score_command(predicted: Path, true: Path, json_file: Path | None, console: Console) -> None:
-    """Print the mean figures of two folders; write them, and those of every image, to a JSON file."""
+    """Print the mean figures of two folders; write them, and those of every image, to a JSON file.
+
+    Raises LabelFolderError for folders that cannot be compared, OutputError where the file cannot be written.
+    """
     images = dict(score_folders(predicted, true))
     mean = mean_scores(list(images.values()))
     if json_file is not None:

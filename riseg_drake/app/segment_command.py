@@ -45,6 +45,7 @@ class SegmentRequest:
     robot: Path | None = None
     camera_frame: str = "camera"
     stamp_limit: float = 0.02
+    """How far apart in time what belongs together may be, s."""
 
 
 @dataclass
@@ -60,7 +61,7 @@ class SegmentResult:
     last: Scores | None = None
     """The scores of the last of these."""
     sums: NDArray[np.float64] = field(default_factory=lambda: np.zeros(len(FIGURES)))
-    """Of the ten figures over them."""
+    """[10], of the ten figures over them."""
     left_out: list[LeftOut] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 

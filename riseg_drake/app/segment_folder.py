@@ -33,7 +33,8 @@ _UNFINISHED_VIDEO = ".overlay.unfinished.mp4"  # OpenCV goes by the ending
 class SegmentFolder:
     """Writes masks, video and scores as they come. What an earlier segmentation left is removed first.
 
-    Use it in a `with` block. Raises OutputError if the folder holds anything else.
+    The video has `rate` frames a second. Use it in a `with` block. Raises OutputError if the folder holds
+    anything else.
     """
 
     def __init__(self, folder: Path, rate: float, about: Mapping[str, Any]):
@@ -58,7 +59,7 @@ class SegmentFolder:
     def write(
         self, name: str, color: NDArray[np.uint8], mask: NDArray[np.uint16], scores: Scores | None
     ) -> None:
-        """Write what belongs to one frame; `name` is its colour image's.
+        """Write what belongs to one frame, colour [H, W, 3] and mask [H, W]; `name` is its colour image's.
 
         Raises OutputError where the disk is full or the folder has gone.
         """

@@ -100,7 +100,10 @@ def measure_stop(happen: Callable[[_World], None], patience: float) -> Stop:
 def judged(
     commands: list[tuple[float, NDArray[np.float64]]], cause: float, parameters: CommandParameters
 ) -> Stop:
-    """The stop in a list of commands (stamp in s, joint angles in rad [7]), for a cause at a wall time, s."""
+    """The stop in a list of commands (stamp in s, joint angles in rad [7]), for a cause at a wall time, s.
+
+    Raises RuntimeError where the arm did not move before.
+    """
     period = 1 / parameters.rate
     stamps = np.array([stamp for stamp, _ in commands])
     steps = np.maximum(np.rint(np.diff(stamps) / period), 1)[:, None] * period

@@ -27,7 +27,7 @@ takes a command for expired."""
 
 
 def bench_stream(scenario: Scenario, images: list[StationOutputs], seconds: float, console: Console) -> None:
-    """Send commands for some time from their own process, beside Alg. 2 on the images without a pause."""
+    """Send commands for some seconds from their own process, beside Alg. 2 on the images without a pause."""
     parameters = CommandParameters()
     lcm = LcmConfig(url=URL)
     stopping = threading.Event()
@@ -50,7 +50,7 @@ def bench_stream(scenario: Scenario, images: list[StationOutputs], seconds: floa
 
 
 def is_even(gaps: NDArray, period: float) -> bool:
-    """Whether a real arm would be content with such gaps, s."""
+    """Whether a real arm would be content with gaps [N], s, where one of `period`, s, is meant."""
     return bool(
         abs(np.median(gaps) - period) <= 0.1 * period
         and np.percentile(gaps, 99.9) <= MOST_GAP

@@ -76,7 +76,7 @@ def graph_segments(
 ) -> NDArray[np.uint16]:
     """Graph-based segmentation of colour and depth (Felzenszwalb and Huttenlocher, IJCV 2004).
 
-    Arguments and answer as those of `depth_clusters`.
+    Arguments and answer, ids [H, W], as those of `depth_clusters`.
     """
     inside = above_table & (depth > 0)
     if not inside.any():

@@ -33,7 +33,10 @@ def score_folders(predicted: Path, true: Path) -> Iterator[tuple[str, Scores]]:
 
 
 def read_labels(path: Path) -> NDArray[np.uint16]:
-    """A label image [H, W] from a PNG of one channel, 8 or 16 bits, whose values are object ids."""
+    """A label image [H, W] from a PNG of one channel, 8 or 16 bits, whose values are object ids.
+
+    Raises LabelFolderError for anything else.
+    """
     # Read and decode apart: imread warns on the terminal where the caller has one clear line to say.
     encoded = np.frombuffer(path.read_bytes(), np.uint8)
     image = cv2.imdecode(encoded, cv2.IMREAD_UNCHANGED) if encoded.size else None

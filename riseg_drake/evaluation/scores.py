@@ -108,7 +108,7 @@ def score(prediction: NDArray, ground_truth: NDArray) -> Scores:
 
 
 def mean_scores(scores: Sequence[Scores]) -> Scores:
-    """The figures of a data set: the unweighted mean of each over its images (at least one)."""
+    """The figures of a data set: the unweighted mean of each over its images. Raises ValueError for none."""
     if not scores:
         raise ValueError("no images to take the mean of")
     return Scores(*np.mean([astuple(image) for image in scores], axis=0).tolist())

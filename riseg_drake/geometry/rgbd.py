@@ -54,7 +54,7 @@ class Frame(Immutable):
 
     @cached_property
     def unhidden_gray(self) -> NDArray[np.float32]:
-        """The same with NaN where the robot is in the way."""
+        """The same [H, W] with NaN where the robot is in the way."""
         return np.where(self.robot, np.float32(np.nan), self.gray)
 
     @cached_property
@@ -74,7 +74,7 @@ class FramePair(Immutable):
 
     @property
     def X_C1C0(self) -> NDArray[np.float64]:
-        """The paper's camT_{t-1,t}: takes points of the camera at t-1 to the camera at t."""
+        """The paper's camT_{t-1,t}, [4, 4]: takes points of the camera at t-1 to the camera at t."""
         return np.linalg.inv(self.current.X_WC) @ self.reference.X_WC
 
 
@@ -85,6 +85,6 @@ def smooth_gray(color: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 
 def sanitize_depth(depth: NDArray) -> NDArray[np.float32]:
-    """Depth in metres as float32 with every spelling of "invalid" (NaN, inf, < 0) turned into 0."""
+    """Depth [H, W] in metres as float32 with every spelling of "invalid" (NaN, inf, < 0) turned into 0."""
     depth = np.asarray(depth, np.float32)
     return np.where((depth > 0) & (depth < np.inf), depth, np.float32(0))

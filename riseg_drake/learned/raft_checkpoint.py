@@ -32,7 +32,7 @@ def load_raft(path: Path) -> Raft:
 
 
 def read_checkpoint(path: Path) -> dict[str, Tensor]:
-    """The tensors of a file by name. Nothing in the file is executed (`weights_only`)."""
+    """The tensors of a file by name. Nothing in the file is executed (`weights_only`). Raises ModelError."""
     if not path.is_file():
         raise ModelError(f"{path} is not there; give the file of a RAFT checkpoint (see docs/learned.md)")
     try:

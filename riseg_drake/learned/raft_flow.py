@@ -70,7 +70,7 @@ def to_image_tensor(color: NDArray[np.uint8]) -> "Tensor":
 
 
 def pad(color: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """An image repeated beyond its edges until it has a size that the network takes."""
+    """An image [H, W, 3] repeated beyond its edges until it has a size that the network takes."""
     return np.pad(color, (margins(color.shape[0]), margins(color.shape[1]), (0, 0)), mode="edge")
 
 

@@ -31,6 +31,7 @@ class TrainingParameters:
     learning_rate: float = 4e-4
     """At its highest (as in the paper)."""
     weight_decay: float = 1e-5
+    """Of AdamW."""
     decay: float = 0.8
     """What an iteration counts against the one after it (paper: 0.8)."""
     gradient_norm: float = 1.0

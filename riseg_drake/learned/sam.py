@@ -83,7 +83,7 @@ class SamSegmenter:
         self._mask_side = 4 * (self._side // int(prompting.patch_size))
 
     def __call__(self, color: NDArray[np.uint8], prompts: Sequence[Prompt]) -> Iterator[Answer]:
-        """Answers in the order of the prompts; the image is looked at once."""
+        """Answers in the order of the prompts; the image [H, W, 3] is looked at once."""
         import torch
 
         scaling = self.scaling(*color.shape[:2])

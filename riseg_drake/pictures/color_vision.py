@@ -37,12 +37,12 @@ _LAB = np.array(
 
 
 def linear_from_srgb(srgb: NDArray) -> NDArray[np.float64]:
-    """Linear RGB, 0 to 1, of sRGB."""
+    """Linear RGB [..., 3], 0 to 1, of sRGB."""
     return np.where(srgb <= 0.04045, srgb / 12.92, ((np.maximum(srgb, 0.04045) + 0.055) / 1.055) ** 2.4)
 
 
 def srgb_from_linear(linear: NDArray) -> NDArray[np.float64]:
-    """sRGB of linear RGB; what no screen can show is cut off at 0 and 1."""
+    """sRGB of linear RGB [..., 3]; what no screen can show is cut off at 0 and 1."""
     shown = np.clip(linear, 0.0, 1.0)
     return np.where(
         shown <= 0.0031308, 12.92 * shown, 1.055 * np.maximum(shown, 0.0031308) ** (1 / 2.4) - 0.055
@@ -60,5 +60,5 @@ def oklab_from_srgb(srgb: NDArray) -> NDArray[np.float64]:
 
 
 def srgb_from_oklab(lab: NDArray) -> NDArray[np.float64]:
-    """The inverse, for colours that a screen can show."""
+    """The inverse, of [..., 3], for colours that a screen can show."""
     return srgb_from_linear((lab @ np.linalg.inv(_LAB).T) ** 3 @ np.linalg.inv(_LMS).T)

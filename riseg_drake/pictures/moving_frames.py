@@ -41,7 +41,7 @@ def plot_moving_frames(
 
 
 def set_triad(meshcat: Meshcat, path: str, X_PB: NDArray, length: float) -> None:
-    """The three axes of a frame B, as rods of that length, m, in Meshcat's frame P of the path's parent."""
+    """The three axes of a frame B at X_PB [4, 4] as rods of that length, m; P is that of the path's parent."""
     meshcat.SetTransform(path, RigidTransform(X_PB))
     for k, (name, color) in enumerate(zip("xyz", _AXIS_COLORS, strict=True)):
         direction = np.eye(3)[k]

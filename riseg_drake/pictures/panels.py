@@ -30,7 +30,7 @@ def panels(titles: Sequence[str], aspect: float = 0.75, columns: int = 0) -> tup
 
     Args:
         titles: of the panels.
-        aspect: height of a panel over its width; 0.75 is that of a 640x480 image.
+        aspect: ratio of a panel's height to its width; 0.75 is that of a 640x480 image.
         columns: panels in a row; 0: all in one.
     """
     columns = columns or len(titles)

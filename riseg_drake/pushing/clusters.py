@@ -45,7 +45,7 @@ class Cluster:
     center_W: NDArray[np.float64]
     """[2], m."""
     cells: NDArray[np.bool_]
-    """P, as cells of the map."""
+    """P, as cells of the map [rows, columns]."""
 
 
 def find_clusters(
@@ -54,7 +54,7 @@ def find_clusters(
     parameters: ClustersParameters,
     rng: np.random.Generator,
 ) -> Iterator[list[Cluster]]:
-    """centers and clusterPoints of objsToSegment; then, if asked again, ever finer ones."""
+    """centers and clusterPoints of objsToSegment [rows, columns]; then, if asked again, ever finer ones."""
     pieces = take_apart(to_segment, table, parameters) if parameters.by_piece else [to_segment]
     divisions = []
     for piece in pieces:
@@ -79,7 +79,7 @@ def find_clusters(
 def take_apart(
     mask: NDArray[np.bool_], table: TableMap, parameters: ClustersParameters
 ) -> list[NDArray[np.bool_]]:
-    """The connected pieces of a mask, and those with a nook again cut at their necks, narrow ones first."""
+    """The connected pieces of a mask [rows, columns]; those with a nook cut at their necks, narrow first."""
     pieces = split_at_necks(mask, table, parameters.neck, 0.0)
     for neck in np.arange(parameters.neck, parameters.widest_neck, 2 * table.cell)[1:]:
         pieces = [
@@ -97,7 +97,7 @@ def take_apart(
 def split_at_necks(
     mask: NDArray[np.bool_], table: TableMap, neck: float, smallest: float
 ) -> list[NDArray[np.bool_]]:
-    """The connected pieces of a mask, also cut where they hang together by less than `neck` metres.
+    """The connected pieces of a mask [rows, columns], also cut where they hang together by less than `neck`, m.
 
     What would be smaller than `smallest`, m^2, is a limb rather than a piece and stays where it is.
     """
@@ -128,7 +128,7 @@ def _by_nearest_core(mask: NDArray[np.bool_], core_of: NDArray) -> NDArray[np.in
 
 
 def concavity(piece: NDArray[np.bool_], cell: float) -> float:
-    """How far a piece's outline recedes from its convex hull, m; 0 for a convex one. Holes do not count."""
+    """How far the outline of a piece [rows, columns] recedes from its convex hull, m. Holes do not count."""
     outlines, _ = cv2.findContours(piece.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     filled, hull = np.zeros((2, *piece.shape), np.uint8)
     cv2.drawContours(filled, outlines, -1, 1, cv2.FILLED)

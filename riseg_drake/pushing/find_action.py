@@ -84,7 +84,10 @@ def best_push(
     plan_path: Callable[[Push], PushPath | None] | None,
     parameters: FindActionParameters,
 ) -> Push | None:
-    """The best of the valid pushes of all clusters that the arm can do (lines 7 to 12); None if none."""
+    """The best of the valid pushes of all clusters that the arm can do (lines 7 to 12); None if none.
+
+    `heading_W` is the direction [2] in which the pusher points now; None: all are alike.
+    """
     largest = max(int(cluster.cells.sum()) for cluster in clusters)
     pushes: list[Push] = []
     for cluster in clusters:  # line 8

@@ -24,7 +24,7 @@ class ObjectsToSegmentParameters:
 def objects_to_segment(
     table: TableMap, parameters: ObjectsToSegmentParameters | None = None
 ) -> NDArray[np.bool_]:
-    """objsToSegment = objMask - binL on the map, without slivers and specks.
+    """objsToSegment = objMask - binL on the map, [rows, columns], without slivers and specks.
 
     A connected piece stays, with the part of it that lies within a rim of segmented objects, if the
     part beyond those rims is large enough.

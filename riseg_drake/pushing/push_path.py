@@ -72,7 +72,7 @@ class PushPath:
         return self.trajectory.value(clamped)[:, 0]
 
     def phase(self, time: float) -> ArmPhase:
-        """What the arm does at a time since the start."""
+        """What the arm does at a time since the start, s."""
         if time < self.push_start:
             return ArmPhase.APPROACH
         return ArmPhase.PUSH if time < self.push_end else ArmPhase.RETREAT

@@ -35,13 +35,13 @@ class TableMap:
     cell: float
     """Edge of a cell, m."""
     objects: NDArray[np.bool_]
-    """The paper's objMask: cells with something above the table."""
+    """[rows, columns], the paper's objMask: cells with something above the table."""
     segmented: NDArray[np.bool_]
-    """The paper's binL: cells whose highest point has an object id in L_t."""
+    """[rows, columns], the paper's binL: cells whose highest point has an object id in L_t."""
     height: NDArray[np.float32]
-    """Height of the highest point seen in a cell above the table, m; 0 where there is no object."""
+    """[rows, columns], height of the highest point seen in a cell above the table, m; 0 where no object is."""
     seen: NDArray[np.bool_]
-    """Cells of which the camera saw anything; the others lie in a shadow or outside of the view."""
+    """[rows, columns], cells of which the camera saw anything; others lie in a shadow or out of the view."""
     work_area_W: tuple[float, float, float, float]
     """(x_min, x_max, y_min, y_max), m."""
     plane_W: NDArray[np.float64] = field(default_factory=lambda: np.array([0.0, 0.0, 1.0, 0.0]))
@@ -78,7 +78,7 @@ class TableMap:
 
 
 def binarize_mask(mask: NDArray) -> NDArray[np.bool_]:
-    """binL (eq. 3): where L_t holds an object id."""
+    """binL (eq. 3), [H, W]: where L_t holds an object id."""
     return mask > 0
 
 

@@ -27,7 +27,7 @@ class SpeedLimits:
 
 
 def minimum_jerk(tau: NDArray) -> NDArray[np.float64]:
-    """s = 10 tau^3 - 15 tau^4 + 6 tau^5: at rest, without acceleration, at both ends."""
+    """s = 10 tau^3 - 15 tau^4 + 6 tau^5 and its derivatives [4, N]: at rest, unaccelerated, at both ends."""
     return np.stack(
         [
             tau**3 * (10 - 15 * tau + 6 * tau**2),
@@ -39,7 +39,7 @@ def minimum_jerk(tau: NDArray) -> NDArray[np.float64]:
 
 
 def steady_speed(ramp: float) -> Profile:
-    """A profile with one speed but for smooth ramps, each `ramp` (<= 0.5) of the time, at both ends.
+    """A profile with one speed but for smooth ramps, each a share `ramp` (<= 0.5) of the time, at both ends.
 
     In a ramp the speed follows 3 x^2 - 2 x^3.
     """

@@ -31,7 +31,7 @@ class ValidityParameters:
 
 @dataclass(frozen=True)
 class Validity:
-    """What IsValidPush says about N candidates, criterion by criterion."""
+    """What IsValidPush says about N candidates, criterion by criterion, each [N]."""
 
     center_on_object: NDArray[np.bool_]
     accessible: NDArray[np.bool_]
@@ -67,7 +67,8 @@ def is_valid_push(
 ) -> Validity:
     """IsValidPush for all candidates of one cluster: N contact points b with directions bc, one c.
 
-    `cluster` is P as cells of the map; `table.objects` is objMask.
+    `b_W` [N, 2] and `center_W` [2] are in m, `direction_W` is [N, 2]; `cluster` is P as cells of the map
+    [rows, columns], `table.objects` objMask.
     """
     overlap = overlap_after_push(direction_W, cluster, table, parameters.d_push)
     return Validity(
@@ -79,7 +80,7 @@ def is_valid_push(
 
 
 def center_on_object(center_W: NDArray, table: TableMap) -> bool:
-    """First criterion: objMask^c = 1."""
+    """First criterion: objMask^c = 1 at c [2], m."""
     return bool(table.lookup(table.objects, center_W))
 
 
@@ -88,8 +89,8 @@ def accessible(
 ) -> NDArray[np.bool_]:
     """Second criterion: objMask = 0 in all of the area the end effector needs, a short distance from b.
 
-    The area is the bar's cross section with its margin all around, the bar's face being `clearance`
-    behind b along cb.
+    The area is the bar's cross section with its margin all around, the bar's face being `clearance`, m,
+    behind b along cb; b [N, 2], m, directions bc [N, 2].
     """
     margin = pusher.margin
     along = _steps(-clearance - pusher.thickness - margin, -clearance + min(margin, clearance / 2), table)
@@ -102,7 +103,10 @@ def accessible(
 def overlap_after_push(
     direction_W: NDArray, cluster: NDArray[np.bool_], table: TableMap, distance: float
 ) -> NDArray[np.float64]:
-    """Third criterion: |isect| / |P|, where isect is P moved along bc, and objMask without P (eq. 4)."""
+    """Third criterion: |isect| / |P|, where isect is P moved along bc, and objMask without P (eq. 4).
+
+    For directions bc [N, 2] and P as cells [rows, columns], moved by `distance`, m.
+    """
     others = table.objects & ~cluster
     P = table.points(cluster)
     if len(P) > 1500:  # a share needs no more points than that

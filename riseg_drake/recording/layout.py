@@ -90,7 +90,7 @@ class RecordedFrame:
 
 
 def camera_to_json(intrinsics: Intrinsics, depth_scale: float) -> dict[str, float]:
-    """The content of camera.json."""
+    """The content of camera.json; `depth_scale` in units per metre."""
     return {**asdict(intrinsics), "depth_scale": depth_scale}
 
 

@@ -20,7 +20,7 @@ class RecordingWriter:
 
     Memory does not grow with the recording. A list names an image only once that image is whole, so a
     recording that was cut off is short, never damaged. Joints and times are written to the last bit;
-    depth is rounded to millimetres.
+    depth is rounded to millimetres. Raises RecordingError where a recording is there already.
     """
 
     def __init__(self, folder: Path, intrinsics: Intrinsics):

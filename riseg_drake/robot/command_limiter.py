@@ -31,7 +31,7 @@ _TINY = 1e-3  # rad; no target is taken for one beyond a range for less
 
 @dataclass
 class CommandLimits:
-    """Shares of the published limits of the joints that commands may use."""
+    """Shares of the published limits of the joints that commands may use, more than 0 and at most 1."""
 
     velocity: float = 0.4
     acceleration: float = 0.4
@@ -73,6 +73,7 @@ class CommandLimiter:
     """The trajectory of the commands, advanced by one period at a time. Knows no clock.
 
     `position`, `velocity`, `acceleration` are where it is now, each [7]; it begins at rest.
+    A period is 0.005 s if nothing else is said.
     """
 
     BANDWIDTH = 60.0

@@ -162,7 +162,10 @@ class CommandStream:
     def step(
         self, now: float, status: ArmStatus | None, image_time: float | None
     ) -> NDArray[np.float64] | None:
-        """The command of one period: joint angles or velocities [7] by mode; None while there is none."""
+        """The command of one period: joint angles or velocities [7] by mode; None while there is none.
+
+        `now` and `image_time`, that of the newest picture, are in s.
+        """
         could_move = self.state.may_move
         target = self._playout.advance(self.period) if could_move else None
         self.state = supervise(self.state, self._look(now, status, image_time, target), self._parameters.safety)

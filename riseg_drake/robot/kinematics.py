@@ -109,7 +109,7 @@ class PandaKinematics:
     def clearance(self, q: NDArray, reach: float = 0.1) -> float:
         """Smallest signed distance of arm, pusher and camera to the table and among each other, m.
 
-        Negative where they penetrate; `reach` where nothing is nearer than that.
+        At joint angles q [7], rad. Negative where they penetrate; `reach`, m, where nothing is nearer.
         """
         self.plant.SetPositions(self._context, q)
         query = self.plant.get_geometry_query_input_port().Eval(self._context)
@@ -128,7 +128,7 @@ class PandaKinematics:
         margin: float = LIMIT_MARGIN,
         min_clearance: float = MIN_CLEARANCE,
     ) -> NDArray[np.float64] | None:
-        """Joint angles [7] with the tip exactly at X_WE [4, 4], free of collision, or None.
+        """Joint angles [7], rad, with the tip exactly at X_WE [4, 4], free of collision, or None.
 
         Of all such postures the one nearest to q_near [7] is taken (largest joint difference), with some
         liking for room to the joints' limits.

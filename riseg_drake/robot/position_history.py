@@ -31,7 +31,7 @@ class PositionHistory:
         return self._times[-1] if self._times else -np.inf
 
     def at(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """Position and velocity at a time, s, on the straight line between its neighbours.
+        """Position and velocity [7] at a time, s, on the straight line between its neighbours.
 
         None for a time before the first or after the last: nothing is guessed.
         """

@@ -73,7 +73,7 @@ class TargetPlayout:
         self._positions.append(position)
 
     def advance(self, period: float) -> Target | None:
-        """Go on by one period; what to be at then, or None before the first target."""
+        """Go on by one period, s; what to be at then, or None before the first target."""
         if self.time is None:
             return None
         wanted = float(np.sqrt(2 * self._parameters.slope * max(self.remaining - self.RESERVE, 0.0)))

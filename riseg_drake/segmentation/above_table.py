@@ -56,7 +56,7 @@ class AboveTable(Immutable):
     """Median depth of what stands on the table, m; 1 where nothing does."""
 
     def pixels_per_metre(self, intrinsics: Intrinsics) -> float:
-        """How large things that stand on the table appear, about."""
+        """How large things that stand on the table appear, about, pixels a metre."""
         return intrinsics.fx / self.distance
 
 

@@ -74,7 +74,7 @@ class EdgePixels(Immutable):
     """[pieces] each: pieces that are likely to move as one, large blank surfaces and known objects."""
 
     def subset(self, which: NDArray[np.intp]) -> "EdgePixels":
-        """Some of the pixels, by their numbers."""
+        """Some of the pixels, by their numbers [N]."""
         return EdgePixels(
             self.surface.subset(which),
             self.p_C0Q[which],
@@ -194,7 +194,7 @@ def edge_pixels(
 
 
 def has_contrast(variance: NDArray[np.float32], noise: MeasurementNoise) -> NDArray[np.bool_]:
-    """Which pixels, by their `gray_variance`, have more gradient than noise has: they tell where they are."""
+    """Which pixels, by their `gray_variance` [N], have more gradient than noise, and so tell where they are."""
     least = noise.registration**2 * _GRADIENT_MIN * noise.color**2
     return variance - np.float32(2 * noise.color**2) > least
 

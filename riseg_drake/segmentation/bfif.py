@@ -117,7 +117,7 @@ def _on_one_body(twists: Twists, misfit_max: float) -> NDArray[np.bool_]:
 
 
 def no_groups(flow_span: float = 0.0) -> BFIFGroups:
-    """G_t where nothing moves, or where no body frame can say how."""
+    """G_t where nothing moves, or where no body frame can say how (then by `flow_span`, pixels)."""
     return BFIFGroups(
         pixel=np.empty((0, 2), np.intp),
         V_S=np.empty((0, 6)),

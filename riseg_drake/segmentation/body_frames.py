@@ -54,7 +54,7 @@ class BodyFrames:
         return len(self.pixel)
 
     def subset(self, which: NDArray[np.bool_]) -> "BodyFrames":
-        """Some of the body frames."""
+        """Some of the body frames, by a mask [K]."""
         return BodyFrames(
             self.pixel[which],
             self.p_C0Q0[which],

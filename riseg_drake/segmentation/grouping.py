@@ -47,7 +47,7 @@ def mahalanobis_sample(V: NDArray) -> NDArray[np.float64]:
 
 
 def gaussian_similarity(distance: NDArray, width: float) -> NDArray[np.float64]:
-    """exp(-d^2 / (2 width^2))."""
+    """exp(-d^2 / (2 width^2)) of Mahalanobis distances d [K, K]; d and width count standard deviations."""
     return np.exp(-0.5 * (distance / width) ** 2)
 
 
@@ -72,7 +72,10 @@ def markov_clusters(
 
 
 def group_twists(twists: Twists, parameters: GroupingParameters) -> NDArray[np.intp]:
-    """The group 0.. of each body frame [K]; -1 for those in groups too small to be believed."""
+    """The group 0.. of each body frame [K]; -1 for those in groups too small to be believed.
+
+    Raises ValueError for an unknown kind of covariance.
+    """
     if parameters.covariance not in ("propagated", "sample"):
         raise ValueError(f"no covariance {parameters.covariance!r}: choose propagated or sample")
     K = len(twists.V_S)

@@ -37,7 +37,7 @@ class FlowError:
 
     @property
     def size(self) -> NDArray[np.float32]:
-        """|O - E| of the usable pixels, pixels."""
+        """|O - E| of the N usable pixels, [N], pixels."""
         return np.linalg.norm(self.observed - self.expected, axis=-1)[self.usable]
 
     @property
@@ -77,7 +77,7 @@ def verdict(errors: Sequence[FlowError]) -> tuple[float, str]:
 
 
 def draw_flow_error(error: FlowError, step: int = 32, scale: float = 2.0) -> NDArray[np.uint8]:
-    """The picture [H, W, 3] with expected (blue) and observed (orange) flow as arrows, enlarged by `scale`."""
+    """The picture [H, W, 3] with expected (blue) and observed (orange) flow as arrows `scale` times as long."""
     picture = error.pair.reference.color.copy()
     height, width = error.usable.shape
     for v in range(step // 2, height, step):

@@ -14,7 +14,7 @@ _TINY = 1e-6
 def gray_costs(
     before: NDArray[np.float32],
     after: NDArray[np.float32],
-    per_variance: NDArray[np.float32],
+    per_variance: NDArray,
     piece: NDArray[np.intp],
     count: int,
     cost_max: float,
@@ -26,7 +26,7 @@ def gray_costs(
         before: [N], gray values at t-1.
         after: [N], those found at t; NaN where none was.
         per_variance: [N], 1 / variance of the difference, where they belong together.
-        piece: [N], 0..count-1, what the light changes on at once.
+        piece: [N], 0..count-1, each changes its light as one.
         count: number of pieces.
         cost_max: squared residuals count no more than that.
         relit: what it adds to each pixel of a piece if the light there is taken to have changed.
@@ -44,9 +44,8 @@ def gray_costs(
         return cost
     piece, before, after, weight = piece[mine], before[mine], after[mine], per_variance[mine]
     # The factor that fits a piece best, by least squares.
-    factor = np.bincount(piece, weight * before * after, count)
-    factor /= np.maximum(np.bincount(piece, weight * before**2, count), _TINY)
-    by = factor.astype(np.float32)[piece]
+    squares = np.maximum(np.bincount(piece, weight * before**2, count), _TINY)
+    by = (np.bincount(piece, weight * before * after, count) / squares).astype(np.float32)[piece]
     # With it the noise of the first image is amplified.
     other = (after - by * before) ** 2 * weight / np.maximum(by, 1) ** 2
     other = np.minimum(other, ceiling) + np.float32(relit)

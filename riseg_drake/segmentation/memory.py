@@ -27,7 +27,7 @@ def world_motion(motion_C0: NDArray, X_WC0: NDArray) -> NDArray[np.float64]:
 
 
 def moved_memory(memory: Memory, motion_of: Mapping[int, NDArray], X_WC0: NDArray) -> Memory:
-    """The memory with each object's points where its motion has taken them."""
+    """The memory with each object's points where its motion [4, 4] in C0 has taken them."""
     return {
         a: move_points(world_motion(motion_of[a], X_WC0), p_WQ) if a in motion_of else p_WQ
         for a, p_WQ in memory.items()

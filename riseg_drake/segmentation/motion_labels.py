@@ -188,9 +188,8 @@ def label_by_motion(
     label = refute_motions(
         pair,
         label,
-        pieces.pieces.label,
+        pieces.pieces,
         pieces.region,
-        pieces.pieces.borders,
         pieces.surface,
         pieces.surface_piece,
         motions,
@@ -275,7 +274,7 @@ def motion_costs(
             per_variance,
             pieces.piece,
             pieces.pieces.count,
-            ceiling,
+            cost_max,
             relit,
         )
         sigma = depth_sigma(sought.depth, float(np.sqrt(2)) * depth_noise)

@@ -109,7 +109,8 @@ def merge_equal_motions(
 ) -> NDArray[np.intp]:
     """The groups, joined where their motions cannot be told apart, dropped where they stand still.
 
-    Groups come largest first, so a group joins the largest one that moves like it.
+    `group` [K] numbers the motions [G, 4, 4], largest first, so a group joins the largest one that moves like
+    it. The focal length, pixels, tells how far motions are apart in the image.
     """
     p = frames.p_C0Q0[:, 0]
     new_of = {-1: -1}
@@ -131,7 +132,10 @@ def merge_equal_motions(
 
 
 def motion_gaps(p_C0Q: NDArray, motions: NDArray, focal_length: float) -> NDArray[np.float64]:
-    """Pixels by which standing still (index 0) and the motions [G, 4, 4] differ, [1 + G, 1 + G]."""
+    """Pixels by which standing still (index 0) and the motions [G, 4, 4] differ, [1 + G, 1 + G].
+
+    At the points p_C0Q [N, 3], m, seen with the focal length, pixels.
+    """
     moved = np.stack([p_C0Q[:, :2], *(move_points(X, p_C0Q)[:, :2] for X in motions)])
     moved *= focal_length / p_C0Q[:, 2:]
     apart = moved[:, None] - moved[None]
@@ -143,7 +147,8 @@ def with_earlier_motions(
 ) -> NDArray[np.float64]:
     """The groups' motions, then those found earlier that no group has now, [G', 4, 4].
 
-    What has moved since the reference frame stays displaced, even in a frame in which no group says so.
+    What has moved since the reference frame stays displaced, even in a frame in which no group says so. The
+    focal length, pixels, tells how far motions are apart in the image.
     """
     motions = list(groups.motion_C0)
     for X in earlier:

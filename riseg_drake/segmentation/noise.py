@@ -27,7 +27,7 @@ class MeasurementNoise:
 
 
 def depth_sigma(depth: NDArray, noise_at_1m: float) -> NDArray:
-    """Standard deviation of stereo depth, m: a constant disparity error grows with depth squared."""
+    """Standard deviation of stereo depth [...], m: a constant disparity error grows with depth squared."""
     return noise_at_1m * depth**2
 
 

@@ -71,7 +71,7 @@ def carry_labels(
 
 
 def nearest_label(label: NDArray[np.uint16], inside: NDArray[np.bool_], reach: float) -> NDArray[np.uint16]:
-    """Give each unlabelled pixel inside the label nearest to it, UNKNOWN beyond `reach` pixels.
+    """Give each unlabelled pixel inside [H, W] the label nearest to it, UNKNOWN beyond `reach` pixels.
 
     Objects that come into view, or are put there, must not become part of their neighbours.
     """

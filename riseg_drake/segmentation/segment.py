@@ -97,7 +97,7 @@ class Segmentation(Immutable):
 
     @property
     def settled_mask(self) -> NDArray[np.uint16]:
-        """L_t without the objects in doubt: what needs no further push."""
+        """L_t [H, W] without the objects in doubt: what needs no further push."""
         mask = self.mask
         return np.where(np.isin(mask, list(self.doubtful)), np.uint16(0), mask) if self.doubtful else mask
 
@@ -149,6 +149,9 @@ def segment(
         above_0: objMask at t-1.
         above_1: objMask at t.
         parameters: see there.
+
+    Raises:
+        ValueError: for an unknown kind of outline or propagation.
     """
     if before.sequence == pair.current.sequence:
         return before
@@ -191,7 +194,7 @@ def segment(
 
 
 def push_by_flow(label: NDArray[np.uint16], optical_flow: NDArray[np.float32]) -> NDArray[np.uint16]:
-    """L_t(x, y) = L_t-1(i, j) with (x, y) = (i, j) + O_t(i, j) in whole pixels, as the paper writes it."""
+    """L_t(x, y) = L_t-1(i, j) with (x, y) = (i, j) + O_t(i, j) in whole pixels, [H, W], as the paper has it."""
     out = np.zeros_like(label)
     v, u = np.nonzero(label)
     target = np.rint(pixel_grid(*label.shape)[v, u] + optical_flow[v, u]).astype(int)

@@ -31,7 +31,7 @@ class SurfacePixels(Immutable):
         return len(self.depth)
 
     def subset(self, which: NDArray[np.intp]) -> "SurfacePixels":
-        """Some of the pixels, by their numbers."""
+        """Some of the pixels, by their numbers [N]."""
         return _rows_of_pixels(self.pixel[:, which], self.depth[which], self.intrinsics)
 
 

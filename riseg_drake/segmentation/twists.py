@@ -33,7 +33,7 @@ class Twists:
     """[K], mean squared normalised residual of a frame's points: 1 where the noise explains it."""
 
     def subset(self, which: NDArray[np.bool_]) -> "Twists":
-        """The twists of some of the body frames."""
+        """The twists of some of the body frames, by a mask [K]."""
         return Twists(self.V_S[which], self.covariance[which], self.p_C0S, self.misfit[which])
 
 
@@ -66,7 +66,7 @@ def change_space_frame(V_A: NDArray, covariance: NDArray, p_BA: NDArray) -> tupl
 
 
 def triplet_twists(frames: BodyFrames, p_C0S: NDArray) -> Twists:
-    """The literal BFIFs of triplets. They know nothing of their noise: covariance of the sample."""
+    """The literal BFIFs of triplets, about S at p_C0S [3], m. Of their noise they know the sample's alone."""
     move = translation(-p_C0S)
     T_0, T_1 = (move @ triplet_pose(p[:, 0], p[:, 1], p[:, 2]) for p in (frames.p_C0Q0, frames.p_C0Q1))
     V_S = spatial_twist(T_0, T_1)

@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from riseg_drake.geometry.camera import Region
 from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.segmentation.noise import depth_sigma
+from riseg_drake.segmentation.superpixels import Superpixels
 from riseg_drake.segmentation.surface import SurfacePixels, seek
 
 _NEXT = np.ones((3, 3), np.uint8)
@@ -27,7 +28,7 @@ class VacatedParameters:
     """When depth says that a part has not moved as it seems to have."""
 
     area_min: float = 2.5e-5
-    """m^2 of left places in which depth was measured; fewer tell nothing."""
+    """m^2 of left places in which depth was measured; less tells nothing."""
     share: float = 0.75
     """Of these, how many must show the surface that should have gone."""
     sigmas: float = 3.0
@@ -37,10 +38,9 @@ class VacatedParameters:
 def refute_motions(
     pair: FramePair,
     label: NDArray[np.intp],
-    piece_image: NDArray[np.intp],
+    pieces: Superpixels,
     region: Region,
-    borders: NDArray[np.intp],
-    witnesses: SurfacePixels,
+    surface: SurfacePixels,
     piece: NDArray[np.intp],
     motions: NDArray[np.float64],
     depth_noise: float,
@@ -49,33 +49,33 @@ def refute_motions(
     """The labels without motions that depth refutes.
 
     Each connected part with one label is asked: had it moved as its neighbours, or not at all, where
-    would it be now, and not where it seems to have gone? If its surface is there, it has.
+    would it be now, but for where it seems to have gone? If its surface is there, so it has.
 
     Args:
         pair: the frames of t-1 and t.
         label: [pieces], 1 + number of the motion, 0 = stands still.
-        piece_image: [h, w], number of each pixel's piece at t-1, -1 = none, in a region of the view.
+        pieces: of the frame of t-1, in a region of the view.
         region: that region.
-        borders: [M, 2], pieces that touch.
-        witnesses: pixels of t-1 with depth, not on the rim of what stands there.
-        piece: [N], of each witness.
+        surface: the N pixels of pieces that have depth.
+        piece: [N], of each of these.
         motions: [G, 4, 4] in C0.
         depth_noise: standard deviation of depth at 1 m, m.
         parameters: see there.
     """
     if not label.any():
         return label
+    borders = pieces.borders
     part, count = _parts(label, borders)
     X = np.concatenate([np.eye(4)[None], motions])
-    focal_length, distance = pair.reference.intrinsics.fx, float(np.median(witnesses.depth))
+    focal_length, distance = pair.reference.intrinsics.fx, float(np.median(surface.depth))
     pixels_min = parameters.area_min * (focal_length / distance) ** 2
     own = np.zeros(pair.reference.depth.shape, np.uint8)
     best = np.zeros(count)
     out = label.copy()
     for k in np.unique(label[label > 0]):
         mine = np.flatnonzero(label[piece] == k)
-        own[region] = cv2.dilate(np.append(label == k, False)[piece_image].astype(np.uint8), _NEXT)
-        pixels = witnesses.subset(mine)
+        own[region] = cv2.dilate(np.append(label == k, False)[pieces.label].astype(np.uint8), _NEXT)
+        pixels = surface.subset(mine)
         part_of = part[piece[mine]]
         for other in _neighbours(label, borders, k):
             # Where the other motion puts a point, its own part may be by now, from another place.

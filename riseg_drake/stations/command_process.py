@@ -69,7 +69,7 @@ class StreamReport:
 
 
 def command_message(command: NDArray, mode: str, stamp: float) -> lcmt_panda_command:
-    """What the driver accepts: the fields of its own mode filled, all others empty."""
+    """What the driver accepts: `command` [7] in the fields of its mode, stamped, s, and nothing else."""
     message = lcmt_panda_command()
     message.utime = int(stamp * 1e6)
     if mode == VELOCITY:
@@ -141,7 +141,7 @@ class CommandProcess:
         return self._report
 
     def close(self, patience: float = 3.0) -> None:
-        """Bring the arm to rest and end the process."""
+        """Bring the arm to rest and end the process, within `patience`, s, or by force."""
         with suppress(CommandError):
             self._send("end")
         deadline = time.monotonic() + patience

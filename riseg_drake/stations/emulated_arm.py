@@ -66,7 +66,7 @@ class EmulatedArm:
         self._external += _FILTER * (port.Eval(self._context) - self._external)
 
     def positions(self) -> NDArray[np.float64]:
-        """Positions of all joints and bodies, in the plant's order: what a camera's picture depends on."""
+        """Positions [num_positions] of the plant, in its order: what a camera's picture depends on."""
         return np.array(self.plant.GetPositions(self._context))
 
     def status(self) -> lcmt_panda_status:

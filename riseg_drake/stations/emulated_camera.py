@@ -62,7 +62,7 @@ class EmulatedCamera:
         self._context = self._sensor.GetMyContextFromRoot(self._root)
 
     def look(self, positions: NDArray) -> None:
-        """Arrange the world by the positions of its plant."""
+        """Arrange the world by the positions [num_positions] of its plant."""
         self._plant.SetPositions(self._plant_context, positions)
 
     def picture(self, number: int) -> Picture:

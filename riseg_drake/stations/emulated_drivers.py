@@ -151,7 +151,7 @@ class Moment:
     wall_us: int
     """Wall time, microseconds."""
     positions: NDArray[np.float64]
-    """Of all joints and bodies, in the plant's order."""
+    """[num_positions], of all joints and bodies, in the plant's order."""
     is_standing: bool
     """Whether the arm stands still."""
 

@@ -38,7 +38,7 @@ class Footprint:
     """Height of the lowest point above the body's origin, m (mostly <= 0)."""
 
     def moved(self, yaw: float, p_xy: NDArray) -> "Footprint":
-        """The same shape turned about its origin by `yaw` (rad), then moved by `p_xy` (m)."""
+        """The same shape turned about its origin by `yaw` (rad), then moved by `p_xy` [2] (m)."""
         c, s = np.cos(yaw), np.sin(yaw)
         R = np.array([[c, -s], [s, c]])
         return Footprint(tuple(piece @ R.T + p_xy for piece in self.pieces), self.bottom)
@@ -84,7 +84,7 @@ def _inside(points: NDArray, convex: NDArray) -> NDArray:
 
 
 def shape_corners(shape: Shape) -> NDArray:
-    """Points [n, 3] whose convex hull is the shape, or very nearly."""
+    """Points [n, 3] whose convex hull is the shape, or very nearly. Raises ValueError for an unknown shape."""
     match shape:
         case Box():
             half = np.asarray(shape.size()) / 2

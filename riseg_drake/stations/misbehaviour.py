@@ -97,7 +97,7 @@ class UnreliableLink:
             setattr(self.faults, word.verb, word.amount)
 
     def is_stalled(self, now: float) -> bool:
-        """Whether the sender hangs: it neither sends nor listens."""
+        """Whether the sender hangs at the time `now`, s: it neither sends nor listens."""
         return now < self._stalled_until
 
     def send(self, message: bytes, now: float) -> None:

@@ -41,7 +41,7 @@ class SensorNoise:
 
 
 def depth_std(depth: NDArray, noise: SensorNoise) -> NDArray:
-    """Standard deviation of the depth noise, m, at a depth, m (rounding not included)."""
+    """Standard deviation of the depth noise, m, at depths [...], m (rounding not included)."""
     return depth * depth * np.float32(noise.disparity_std / (noise.focal_length * noise.baseline))
 
 

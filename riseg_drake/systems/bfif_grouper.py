@@ -15,11 +15,15 @@ class BFIFGrouper(LeafSystem):
     Body frames are drawn from a generator seeded by `seed` and the frame's number, so the same pair
     gives the same groups.
 
-    Input ports:
-        pair (FramePair), expected_flow, optical_flow ([H, W, 2], pixels),
-        above_table (AboveTable at t-1).
-    Output ports:
-        groups (BFIFGroups), flow_span (1, pixels: effective flow of the fastest group; 0 if none).
+    Inputs:
+        pair: FramePair.
+        expected_flow: E_t [H, W, 2], pixels.
+        optical_flow: O_t [H, W, 2], pixels.
+        above_table: AboveTable at t-1.
+
+    Outputs:
+        groups: BFIFGroups.
+        flow_span: effective flow of the fastest group [1], pixels; 0 if there is none.
     """
 
     def __init__(self, parameters: BFIFParameters | None = None, seed: int = 0) -> None:

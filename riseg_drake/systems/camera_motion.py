@@ -12,11 +12,15 @@ from riseg_drake.systems.stage_clock import timed
 class CameraMotion(LeafSystem):
     """What of the poses of a pair can be believed.
 
-    Input ports:
-        pair (FramePair), optical_flow ([H, W, 2], pixels), above_table_reference, above_table (AboveTable
-        at t-1 and at t), pose_error (PoseError).
-    Output port:
-        pair (FramePair; the same where the poses are exact).
+    Inputs:
+        pair: FramePair, or None.
+        optical_flow: O_t [H, W, 2], pixels.
+        above_table_reference: AboveTable at t-1.
+        above_table: AboveTable at t.
+        pose_error: PoseError.
+
+    Outputs:
+        pair: FramePair, the same where the poses are exact; None without one.
     """
 
     def __init__(

@@ -11,8 +11,11 @@ from riseg_drake.systems.stage_clock import timed
 class ExpectedFlow(LeafSystem):
     """E_t from depth and forward kinematics.
 
-    Input port: pair (FramePair).
-    Output port: expected_flow ([H, W, 2] float32, pixels, NaN where depth is invalid).
+    Inputs:
+        pair: FramePair.
+
+    Outputs:
+        expected_flow: [H, W, 2] float32, pixels, NaN where depth is invalid.
     """
 
     def __init__(self) -> None:

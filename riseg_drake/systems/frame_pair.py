@@ -29,13 +29,19 @@ class FramePairMemory(LeafSystem):
 
     All stages read the same pair in the same tick: pairing happens here and nowhere else.
 
-    Input ports:
-        frame (Frame or None), above_table (AboveTable of that frame),
-        flow_span (1, pixels: effective flow found in the pair that is in memory).
-    Output ports, of the pair in memory (None before the first frame):
-        pair (FramePair), above_table_reference, above_table (AboveTable at t-1 and at t),
-        pose_error (PoseError: what the table showed of it so far),
-        pair_time (1, s: the time of the frame at t; 0 before the first).
+    All outputs are of the pair in memory, and None before the first frame.
+
+    Inputs:
+        frame: Frame, or None.
+        above_table: AboveTable of that frame.
+        flow_span: effective flow found in the pair that is in memory [1], pixels.
+
+    Outputs:
+        pair: FramePair.
+        above_table_reference: AboveTable at t-1.
+        above_table: AboveTable at t.
+        pose_error: PoseError, what the table showed of it so far.
+        pair_time: time of the frame at t [1], s; 0 before the first.
     """
 
     def __init__(

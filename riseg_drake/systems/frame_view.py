@@ -19,12 +19,18 @@ class FrameView(LeafSystem):
 
     Where the camera is and what the robot covers follows from theta_t, or is said by whoever knows it.
 
-    Input ports:
-        color_image (ImageRgba8U), depth_image (ImageDepth32F, m, aligned to colour),
-        image_time (1, s), position (joint angles theta_t, rad; if anything follows from them),
-        camera_pose (X_WC [4, 4]; without `X_WC`), robot_pixels ([H, W] bool; without `robot_mask`).
-    Output port:
-        frame (Frame, `sequence` 0: who stores frames counts them), None while there is no image.
+    Evaluating `frame` raises ValueError where images and intrinsics are of different size.
+
+    Inputs:
+        color_image: ImageRgba8U.
+        depth_image: ImageDepth32F, m, aligned to colour.
+        image_time: when both were taken [1], s.
+        position: joint angles theta_t [num_positions], rad; there if anything follows from them.
+        camera_pose: X_WC [4, 4]; there where `X_WC` is None.
+        robot_pixels: [H, W] bool; there where `robot_mask` is None.
+
+    Outputs:
+        frame: Frame with `sequence` 0 (who stores frames counts them), None while there is no image.
     """
 
     def __init__(

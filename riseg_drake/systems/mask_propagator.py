@@ -12,13 +12,20 @@ from riseg_drake.systems.stage_clock import timed
 class MaskPropagator(LeafSystem):
     """L_t from G_t, O_t and L_t-1, once for each new frame.
 
-    Input ports:
-        pair (FramePair or None), expected_flow, optical_flow ([H, W, 2], pixels), groups (BFIFGroups),
-        above_table_reference, above_table (AboveTable at t-1 and at t).
-    Output ports, as of the last update:
-        mask ([H, W] uint16, L_t, 0 = background), settled_mask (the same without the objects that may
-        be two, for whoever plans pushes), segmentation (Segmentation: the ids, also of objects
-        out of sight, and where they are remembered).
+    Outputs are as of the last update.
+
+    Inputs:
+        pair: FramePair, or None.
+        expected_flow: E_t [H, W, 2], pixels.
+        optical_flow: O_t [H, W, 2], pixels.
+        groups: BFIFGroups.
+        above_table_reference: AboveTable at t-1.
+        above_table: AboveTable at t.
+
+    Outputs:
+        mask: L_t [H, W] uint16, 0 = background.
+        settled_mask: the same without the objects that may be two, for whoever plans pushes.
+        segmentation: Segmentation, the ids, also of objects out of sight, and where they are remembered.
     """
 
     def __init__(

@@ -56,12 +56,14 @@ class MaskRefiner(LeafSystem):
     L*_t, line 10 of Alg. 1) goes to a worker; its answer appears at the output some frames later. No update
     ever waits for the worker.
 
-    Input ports:
-        pair (FramePair or None), mask (L_t of its current frame, [H, W]),
-        phase (ArmPhase), demand (any value, may be left unconnected: when it changes, the present mask is
-        refined as well).
-    Output port:
-        refined (RefinedMask, the newest; None before the first).
+    Inputs:
+        pair: FramePair, or None.
+        mask: L_t of its current frame [H, W].
+        phase: ArmPhase.
+        demand: any value, may be left unconnected; when it changes, the present mask is refined as well.
+
+    Outputs:
+        refined: RefinedMask, the newest; None before the first.
     """
 
     def __init__(self, refine: Refinement, period: float, offset: float) -> None:

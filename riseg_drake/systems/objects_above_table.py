@@ -10,8 +10,11 @@ from riseg_drake.systems.stage_clock import timed
 class ObjectsAboveTable(LeafSystem):
     """Which pixels see something that stands on the table.
 
-    Input port: frame (Frame or None).
-    Output port: above_table (AboveTable, None without a frame).
+    Inputs:
+        frame: Frame, or None.
+
+    Outputs:
+        above_table: AboveTable; None without a frame.
     """
 
     def __init__(self, parameters: AboveTableParameters | None = None) -> None:

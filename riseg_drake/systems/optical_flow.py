@@ -11,11 +11,13 @@ from riseg_drake.systems.stage_clock import timed
 class OpticalFlow(LeafSystem):
     """O_t by any method that follows the `FlowMethod` protocol; DIS by default.
 
-    Input ports:
-        pair (FramePair), above_table (AboveTable at t-1; may be left unconnected).
-    Output port:
-        optical_flow ([H, W, 2] float32, pixels; of the whole image, or if `above_table` is connected,
-        in and around what stands on the table, NaN elsewhere).
+    Inputs:
+        pair: FramePair.
+        above_table: AboveTable at t-1; may be left unconnected.
+
+    Outputs:
+        optical_flow: O_t [H, W, 2] float32, pixels; of the whole image, or if `above_table` is connected,
+            in and around what stands on the table, NaN elsewhere.
     """
 
     def __init__(self, method: FlowMethod | None = None) -> None:

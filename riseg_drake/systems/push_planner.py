@@ -18,10 +18,10 @@ class PushPlanner(LeafSystem):
         above_table: an object with `mask` bool [H, W], `height` float32 [H, W] in m and `plane_W` [4],
             of the current frame (GetObjsAboveTable).
         mask: L_t of the current frame, [H, W].
-        position: the arm's commanded joint angles [7]; where the path begins and ends.
+        position: the arm's commanded joint angles [7], rad; where the path begins and ends.
         tried_pushes: sequence of TriedPush; may be left unconnected.
 
-    Output:
+    Outputs:
         push: Push with its path, or None when everything is segmented, no valid push exists, or no
             frame has come yet.
 
