@@ -17,7 +17,7 @@ from riseg_drake.geometry.plane import (
     transform_plane,
 )
 from riseg_drake.geometry.rgbd import Frame, Immutable
-from riseg_drake.segmentation.table_extent import off_table
+from riseg_drake.segmentation.table_extent import TableExtentParameters, on_this_table
 
 _COLOR_SPREAD_MIN = 4.0
 """Gray levels; a table's colour is not known better than that."""
@@ -33,9 +33,12 @@ class AboveTableParameters:
     height_min: float = 0.004
     """m; what is lower is table."""
     noise_multiple: float = 4.0
-    """What is lower than so many standard deviations of the depth seen on the table is table, too."""
+    """What is nowhere higher than so many standard deviations of the depth seen on the table is table."""
+    foot_multiple: float = 2.0
+    """The foot of what rises higher than that is as high as so many of them."""
     area_min: float = 1.0e-4
     """m^2; a smaller piece is noise, not an object."""
+    extent: TableExtentParameters = field(default_factory=TableExtentParameters)
 
 
 @dataclass(frozen=True)
@@ -73,18 +76,13 @@ def objects_above_table(frame: Frame, parameters: AboveTableParameters) -> Above
     height = heights_above_plane(frame.depth, frame.intrinsics, plane_C)
     on_table = _on_table(height, frame, parameters)
     depth_noise = _depth_noise(height, frame.depth, on_table, parameters)
-    low = np.maximum(
-        np.float32(parameters.height_min),
-        np.float32(parameters.noise_multiple * depth_noise) * frame.depth**2,
-    )
-    with np.errstate(invalid="ignore"):
-        high = (height > low) & seen
-    elsewhere = off_table(frame, height, plane_C, on_table, parameters.height_min)
-    if elsewhere is not None:
-        high &= ~elsewhere
+    high, clearly = _high(height, frame, depth_noise, parameters)
+    belonging = on_this_table(frame, height, plane_C, on_table, parameters.height_min, parameters.extent)
+    if belonging is not None:
+        high &= belonging
     z = frame.depth[high]
     distance = float(np.median(z)) if len(z) else 1.0
-    mask = _without_specks(high, frame, on_table, parameters.area_min / distance**2)
+    mask = _without_specks(high, clearly, frame, on_table, parameters.area_min / distance**2)
     return AboveTable(mask, height, transform_plane(frame.X_WC, plane_C), depth_noise, distance)
 
 
@@ -112,6 +110,18 @@ def _depth_noise(
     return float(np.sqrt(np.mean((h / z**2) ** 2)))
 
 
+def _high(
+    height: NDArray[np.float32], frame: Frame, depth_noise: float, parameters: AboveTableParameters
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_] | None]:
+    """What may stand on the table [H, W], and what surely does; None where that is the same."""
+    sigma, lowest = np.float32(depth_noise) * frame.depth**2, np.float32(parameters.height_min)
+    with np.errstate(invalid="ignore"):
+        high = (height > np.maximum(lowest, np.float32(parameters.foot_multiple) * sigma)) & ~frame.robot
+        if not parameters.noise_multiple * np.max(sigma, where=high, initial=0) > lowest:
+            return high, None
+        return high, high & (height > np.float32(parameters.noise_multiple) * sigma)
+
+
 def _looks_like_table(color: NDArray[np.uint8], frame: Frame, on_table: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which pixels of an image [H, W, 3] may be the table's, given which of the frame's every fifth are."""
     if np.count_nonzero(on_table) < 100:
@@ -122,9 +132,14 @@ def _looks_like_table(color: NDArray[np.uint8], frame: Frame, on_table: NDArray[
 
 
 def _without_specks(
-    mask: NDArray[np.bool_], frame: Frame, on_table: NDArray[np.bool_], area_min: float
+    mask: NDArray[np.bool_],
+    clearly: NDArray[np.bool_] | None,
+    frame: Frame,
+    on_table: NDArray[np.bool_],
+    area_min: float,
 ) -> NDArray[np.bool_]:
-    """Close pinholes, add the rim without depth, drop pieces that look smaller than `area_min` (m^2 at 1 m)."""
+    """Close pinholes, add the rim and the holes without depth, drop pieces that look smaller than `area_min`
+    (m^2 at 1 m), or of which less than that rises clearly."""
     out = np.zeros_like(mask)
     if not mask.any():
         return out
@@ -135,10 +150,25 @@ def _without_specks(
     # are the object's, where the table has a colour of its own.
     rim = (cv2.dilate(closed, np.ones((3, 3), np.uint8)) > closed) & (depth == 0)
     closed |= rim & ~_looks_like_table(color, frame, on_table)
+    closed |= _enclosed((depth == 0) & (closed == 0), closed)
     closed[robot] = 0
-    _, label, stats, _ = cv2.connectedComponentsWithStats(closed, connectivity=4)
+    number, label, stats, _ = cv2.connectedComponentsWithStats(closed, connectivity=4)
     pixels_min = area_min * frame.intrinsics.fx * frame.intrinsics.fy
     keep = stats[:, cv2.CC_STAT_AREA] >= pixels_min
+    if clearly is not None:
+        keep &= np.bincount(label[clearly[region]], minlength=number) >= pixels_min
     keep[0] = False
     out[region] = keep[label]
     return out
+
+
+def _enclosed(holes: NDArray[np.bool_], around: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Those of the holes [H, W] that border on nothing but what is 1."""
+    number, label = cv2.connectedComponents(holes.view(np.uint8), connectivity=4)
+    outside = cv2.dilate((~holes & (around == 0)).view(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    keep = np.ones(number, bool)
+    keep[label[outside & holes]] = False
+    for border in (label[0], label[-1], label[:, 0], label[:, -1]):
+        keep[border] = False
+    keep[0] = False
+    return keep[label]
