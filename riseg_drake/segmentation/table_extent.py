@@ -20,10 +20,10 @@ from riseg_drake.geometry.rgbd import Frame
 
 _STEP = 10
 """Every so many pixels are looked at first."""
-_CELL = 0.01
-"""m; of the map of the table."""
-_REACH = 3.0
-"""m; the map is cut off that far from the table's middle."""
+_CELL, _COARSE_CELL = 0.01, 0.04
+"""m; of the map of the table, and of the one in which its parts are put together."""
+_REACH = 4.0
+"""m; the map is cut off that far from the camera."""
 _BROAD_SHARE = 0.7
 """Of what lies on the plane; where less than that is broad, the table is full of things."""
 _WALLS, _WALL_HYPOTHESES = 3, 96
@@ -40,6 +40,8 @@ class TableExtentParameters:
     """m beside the seen table; what is farther is surely elsewhere."""
     margin: float = 0.01
     """m beside the seen table; so near is still on it."""
+    unseen: float = 0.2
+    """m; so far the table is taken to go on where the image cuts it off."""
     gap: float = 0.15
     """m; what hides the table parts it no farther than that."""
     wall_width: float = 0.5
@@ -90,7 +92,8 @@ def on_this_table(
         return None
     walls = _walls(feet[seen], few[seen], frame.depth[:: _STEP, :: _STEP][seen], parameters)
     beyond = _in_walls(walls, feet, frame.depth[:: _STEP, :: _STEP], parameters) & (few > height_min)
-    table = _Table(feet[_largest(wide & ~beyond, feet, parameters.gap)])
+    top = _largest(wide & ~beyond, feet, parameters.gap)
+    table = _Table(np.vstack([feet[_ends(top)], _going_on(top, feet, parameters.unseen)]))
     with np.errstate(invalid="ignore"):
         beyond |= (few < -parameters.sunk) | ((few > height_min) & ~table.holds(feet, parameters.far))
     if np.count_nonzero(beyond & seen) < parameters.elsewhere_share * few.size:
@@ -208,13 +211,11 @@ def _in_walls(
 def _largest(wide: NDArray[np.bool_], feet: NDArray, gap: float) -> NDArray[np.bool_]:
     """Which pixels [h, w] see the largest connected part of the table; what lies between two parts, and
     hides the table, does not part them."""
-    at = feet[wide]
-    middle = np.median(at, axis=0)
-    cells = np.rint((np.clip(at, middle - _REACH, middle + _REACH) - middle + _REACH) / (4 * _CELL)).astype(int)
-    size = int(2 * _REACH / (4 * _CELL)) + 1
+    size = int(2 * _REACH / _COARSE_CELL)
+    cells = ((feet[wide] + _REACH) / _COARSE_CELL).astype(int).clip(0, size - 1)
     picture = np.zeros((size, size), np.uint8)
     picture[cells[:, 1], cells[:, 0]] = 1
-    reach = 2 * round(gap / 2 / (4 * _CELL)) + 1
+    reach = 2 * round(gap / 2 / _COARSE_CELL) + 1
     near = cv2.dilate(picture, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach)))
     label = cv2.connectedComponents(near)[1][cells[:, 1], cells[:, 0]]
     out = wide.copy()
@@ -222,13 +223,30 @@ def _largest(wide: NDArray[np.bool_], feet: NDArray, gap: float) -> NDArray[np.b
     return out
 
 
+def _ends(top: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The first and the last pixel of every row: rows are straight on the plane, too, so the hull of these
+    is that of all."""
+    out, rows = np.zeros_like(top), np.flatnonzero(top.any(1))
+    out[rows, top[rows].argmax(1)] = True
+    out[rows, -1 - top[rows, ::-1].argmax(1)] = True
+    return out
+
+
+def _going_on(top: NDArray[np.bool_], feet: NDArray, unseen: float) -> NDArray[np.float32]:
+    """Points [N, 2] of the table outside of the image, beyond where its border cuts the table off."""
+    cut_off = top.copy()
+    cut_off[1:-1, 1:-1] = False
+    edge = feet[cut_off]
+    outwards = edge - feet[top].mean(axis=0)
+    return edge + unseen * outwards / np.maximum(np.linalg.norm(outwards, axis=1, keepdims=True), 1e-6)
+
+
 class _Table:
     """The convex hull of what is seen of a table, on its plane."""
 
     def __init__(self, feet: NDArray):
-        middle = np.median(feet, axis=0)
-        near = np.clip(feet, middle - _REACH, middle + _REACH)
-        self._hull = cv2.convexHull(near.astype(np.float32).reshape(-1, 1, 2))
+        near = feet.clip(-_REACH, _REACH)
+        self._hull = cv2.convexHull(near.reshape(-1, 1, 2))
         self._origin = near.min(axis=0) - 0.1
         self._size = np.ceil((near.max(axis=0) + 0.1 - self._origin) / _CELL).astype(int)
 
@@ -282,8 +300,9 @@ def _standing_on(
     mixed = ~mine & (tall <= parameters.tall_share)
     mine[0] = mixed[0] = False
     belongs = mine[label] | (mixed[label] & table.holds(feet, -parameters.far))
-    rest = off & ~whole
-    belongs |= rest & (cv2.dilate(belongs.view(np.uint8), np.ones((3, 3), np.uint8)) > 0)
+    # What no surface holds, between the pixels and at a step, goes with what is beside it.
+    beside = cv2.dilate(belongs.view(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    belongs = beside & ~(whole & ~belongs)
     large = cv2.resize(
         belongs.view(np.uint8), (2 * belongs.shape[1], 2 * belongs.shape[0]), interpolation=cv2.INTER_NEAREST
     )

@@ -96,7 +96,6 @@ def draw_room(
             hit = (behind > 0) & (behind < depth)
             depth[hit], on_table[hit] = behind[hit], False
             color[hit] = 200 + rng.uniform(-30, 30)
-    normal_dot = np.abs(ray_W[..., 2]) / np.linalg.norm(ray_W, axis=-1)
     for number, solid in enumerate(solids):
         enter = solid.enter(eye_W, ray_W)
         hit = enter < depth
@@ -106,8 +105,8 @@ def draw_room(
     if room.table is not None or wall_y is None:
         on_table &= depth < 6
     color += _texture(depth, ray_W, eye_W, rng)
-    measured = _structured_light if room.structured_light else _stereo
-    depth = measured(depth, normal_dot, intrinsics, rng)
+    measured = structured_light if room.structured_light else stereo
+    depth = measured(depth, intrinsics, rng)
     color = np.clip(np.rint(color + rng.normal(0, 2.5, color.shape)), 0, 255).astype(np.uint8)
     nothing = np.zeros(depth.shape, bool)
     frame = Frame(0, 0.0, intrinsics, color, depth.astype(np.float32), X_WC, nothing)
@@ -222,7 +221,7 @@ def _texture(depth: NDArray, ray_W: NDArray, eye_W: NDArray, rng: np.random.Gene
     return (rng.choice([0.0, 1.0]) * grain + rng.choice([0.0, 1.0]) * checks)[..., None]
 
 
-def _structured_light(depth: NDArray, slant: NDArray, k: Intrinsics, rng: np.random.Generator) -> NDArray:
+def structured_light(depth: NDArray, k: Intrinsics, rng: np.random.Generator) -> NDArray:
     """Kinect: disparity in eighths of a pixel, 75 mm baseline, a shadow to the left of what is near."""
     baseline, z = 0.075, np.where((depth > 0.45) & (depth < 4.5), depth, 0)
     with np.errstate(divide="ignore"):
@@ -241,7 +240,7 @@ def _structured_light(depth: NDArray, slant: NDArray, k: Intrinsics, rng: np.ran
     return _with_holes(np.rint(1000 * z) / 1000, depth, rng) * ~shadow
 
 
-def _stereo(depth: NDArray, slant: NDArray, k: Intrinsics, rng: np.random.Generator) -> NDArray:
+def stereo(depth: NDArray, k: Intrinsics, rng: np.random.Generator) -> NDArray:
     """RealSense D415: 0.08 px of disparity, correlated over a few pixels; whole millimetres."""
     z = np.where((depth > 0.3) & (depth < 5), depth, 0)
     wobble = cv2.GaussianBlur(rng.normal(size=z.shape), (0, 0), 1.5) * 5.3  # of unit variance
