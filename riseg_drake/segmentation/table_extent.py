@@ -84,14 +84,14 @@ def on_this_table(
         parameters: see there.
     """
     along = _axes(plane_C[:3])
-    seen = np.isfinite(height[:: _STEP, :: _STEP]) & ~frame.robot[:: _STEP, :: _STEP]
-    few = height[:: _STEP, :: _STEP]
+    seen = np.isfinite(height[::_STEP, ::_STEP]) & ~frame.robot[::_STEP, ::_STEP]
+    few = height[::_STEP, ::_STEP]
     feet = _feet(frame, along, _STEP)
     wide = _broad(on_table)[::2, ::2] & seen
     if np.count_nonzero(wide) < 12:
         return None
-    walls = _walls(feet[seen], few[seen], frame.depth[:: _STEP, :: _STEP][seen], parameters)
-    beyond = _in_walls(walls, feet, frame.depth[:: _STEP, :: _STEP], parameters) & (few > height_min)
+    walls = _walls(feet[seen], few[seen], frame.depth[::_STEP, ::_STEP][seen], parameters)
+    beyond = _in_walls(walls, feet, frame.depth[::_STEP, ::_STEP], parameters) & (few > height_min)
     top = _largest(wide & ~beyond, feet, parameters.gap)
     table = _Table(np.vstack([feet[_ends(top)], _going_on(top, feet, parameters.unseen)]))
     with np.errstate(invalid="ignore"):

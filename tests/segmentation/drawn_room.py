@@ -262,7 +262,7 @@ KINDS: dict[str, Room] = {
     "table in a room": Room(),
     "floor": Room(table=None, chairs=1, wall=(0.2, 1.5), distance=(1.2, 1.9), heights=(0.05, 0.3)),
     "boxes and cups": Room(
-        table=(1.4, 0.9), objects=6, distance=(0.7, 1.1), elevation=(35, 55), wall=(0.5, 2), chairs=0
+        table=(1.4, 0.9), objects=6, distance=(0.85, 1.15), elevation=(35, 55), wall=(0.5, 2), chairs=0
     ),
     "a third": Room(table=(0.85, 0.75), objects=6, distance=(0.95, 1.15), elevation=(35, 55)),
     "a fifth": Room(table=(0.75, 0.6), objects=6, distance=(1.1, 1.4), elevation=(30, 50)),
