@@ -9,7 +9,7 @@ table's plane, too, but not above the table. Three things tell them from objects
 - What stands on the floor goes on below the table's plane. What stands on the table does not.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.segmentation.walls import WallParameters, find_walls, in_walls
 
 _STEP = 10
 """Every so many pixels are looked at first."""
@@ -26,8 +27,8 @@ _REACH = 4.0
 """m; the map is cut off that far from the camera."""
 _BROAD_SHARE = 0.7
 """Of what lies on the plane; where less than that is broad, the table is full of things."""
-_WALLS, _WALL_HYPOTHESES = 3, 96
-"""Walls that are looked for, and lines through two points that are tried for each."""
+_PIXELS_MIN = 12
+"""Of every tenth; where fewer see the table, nothing can be said of its end."""
 
 
 @dataclass
@@ -35,7 +36,7 @@ class TableExtentParameters:
     """What belongs to a table."""
 
     elsewhere_share: float = 0.03
-    """Share of the image that must be a wall, or far from the table, before its end matters at all."""
+    """Share of the image that must be wall, floor, or far from the table, before its end matters at all."""
     far: float = 0.03
     """m beside the seen table; what is farther is surely elsewhere."""
     margin: float = 0.01
@@ -44,15 +45,10 @@ class TableExtentParameters:
     """m; so far the table is taken to go on where the image cuts it off."""
     gap: float = 0.15
     """m; what hides the table parts it no farther than that."""
-    wall_width: float = 0.5
-    """m; what is less wide is no wall."""
-    wall_thickness: float = 0.01
-    """m; depth noise comes on top."""
-    depth_noise: float = 0.0023
-    """Standard deviation of depth at 1 m, m, that is reckoned with."""
+    walls: WallParameters = field(default_factory=WallParameters)
     step: float = 0.02
-    """m; where neighbouring pixels differ more in depth, what they see is not connected. At 1 m; it grows
-    with the square of depth."""
+    """m; where neighbouring pixels differ more in depth, what they see is not connected. Farther than 1 m
+    it grows with the square of depth."""
     inside_share: float = 0.3
     """Of a connected surface, that makes it the table's."""
     sunk: float = 0.05
@@ -84,18 +80,19 @@ def on_this_table(
         parameters: see there.
     """
     along = _axes(plane_C[:3])
-    seen = np.isfinite(height[::_STEP, ::_STEP]) & ~frame.robot[::_STEP, ::_STEP]
-    few = height[::_STEP, ::_STEP]
-    feet = _feet(frame, along, _STEP)
-    wide = _broad(on_table)[::2, ::2] & seen
-    if np.count_nonzero(wide) < 12:
-        return None
-    walls = _walls(feet[seen], few[seen], frame.depth[::_STEP, ::_STEP][seen], parameters)
-    beyond = _in_walls(walls, feet, frame.depth[::_STEP, ::_STEP], parameters) & (few > height_min)
-    top = _largest(wide & ~beyond, feet, parameters.gap)
-    table = _Table(np.vstack([feet[_ends(top)], _going_on(top, feet, parameters.unseen)]))
+    every = (slice(None, None, _STEP), slice(None, None, _STEP))
+    few, depth, feet = height[every], frame.depth[every], _feet(frame, along, _STEP)
+    seen = np.isfinite(few) & ~frame.robot[every]
     with np.errstate(invalid="ignore"):
-        beyond |= (few < -parameters.sunk) | ((few > height_min) & ~table.holds(feet, parameters.far))
+        above, sunk = few > height_min, few < -parameters.sunk
+    walls = find_walls(feet[seen], few[seen], depth[seen], parameters.walls)
+    beyond = in_walls(walls, feet, depth, parameters.walls) & above
+    wide = _broad(on_table)[::2, ::2] & seen & ~beyond
+    if np.count_nonzero(wide) < _PIXELS_MIN:
+        return None
+    top = _largest(wide, feet, parameters.gap)
+    table = _Table(np.vstack([feet[_ends(top)], _going_on(top, feet, parameters.unseen)]))
+    beyond |= sunk | (above & ~table.holds(feet, parameters.far))
     if np.count_nonzero(beyond & seen) < parameters.elsewhere_share * few.size:
         return None
     return _standing_on(table, walls, frame, height, along, height_min, parameters)
@@ -131,81 +128,6 @@ def _broad(on_table: NDArray[np.bool_]) -> NDArray[np.bool_]:
     # A full table has thin gaps only.
     full = np.count_nonzero(broad) < _BROAD_SHARE * np.count_nonzero(on_table)
     return on_table if full else broad
-
-
-def _walls(feet: NDArray, height: NDArray, depth: NDArray, parameters: TableExtentParameters) -> NDArray:
-    """Upright planes with nothing behind them: lines [n_x, n_y, d] on the plane, the camera's side positive.
-
-    Args:
-        feet: [N, 2], of all that is seen; the camera's own is the origin.
-        height: [N], m above the plane.
-        depth: [N], m.
-        parameters: see there.
-    """
-    rng, found = np.random.default_rng(0), np.empty((0, 3))
-    thickness = _thickness(depth, parameters)
-    upright = height > 0.05
-    for _ in range(_WALLS):
-        asked = np.flatnonzero(upright)
-        if len(asked) < parameters.elsewhere_share * len(height):
-            break
-        a, b = feet[asked[rng.integers(len(asked), size=(2, _WALL_HYPOTHESES))]].astype(float)
-        lines = _lines(a, b)
-        if not len(lines):
-            break
-        apart = lines[:, :2].astype(np.float32) @ feet.T + lines[:, 2:].astype(np.float32)
-        on = (np.abs(apart) < thickness) & upright
-        behind = (apart < -thickness).sum(1)
-        worth = on.sum(1) - 2 * behind
-        best = int(np.argmax(worth))
-        mine = on[best]
-        line = _fitted_line(feet[mine]) if worth[best] > 0 else lines[best]
-        apart = line[:2] @ feet.T + line[2]
-        mine = (np.abs(apart) < thickness) & upright
-        if np.count_nonzero(mine) < parameters.elsewhere_share * len(height):
-            break
-        direction = np.array([-line[1], line[0]])
-        first, last = np.quantile(feet[mine] @ direction, [0.02, 0.98])
-        if np.count_nonzero(apart < -thickness) > 0.1 * np.count_nonzero(mine):
-            break
-        upright &= ~mine
-        if last - first >= parameters.wall_width:
-            found = np.vstack([found, line])
-    return found
-
-
-def _thickness(depth: NDArray, parameters: TableExtentParameters) -> NDArray[np.float32]:
-    return (parameters.wall_thickness + 3 * parameters.depth_noise * depth**2).astype(np.float32)
-
-
-def _lines(a: NDArray, b: NDArray) -> NDArray[np.float64]:
-    """Lines [M, 3] through pairs of points [N, 2] that are not too near each other."""
-    direction = b - a
-    length = np.linalg.norm(direction, axis=1)
-    far = length > 0.1
-    normal = np.column_stack([-direction[far, 1], direction[far, 0]]) / length[far, None]
-    d = -(normal * a[far]).sum(1)
-    return np.column_stack([normal, d]) * np.where(d < 0, -1.0, 1.0)[:, None]
-
-
-def _fitted_line(points: NDArray) -> NDArray[np.float64]:
-    """The line [3] of least squares through points [N, 2], with the origin on its positive side."""
-    centre = points.mean(0, dtype=float)
-    _, vectors = np.linalg.eigh(np.cov(points.T))
-    d = -float(vectors[:, 0] @ centre)
-    return np.append(vectors[:, 0], d) * (-1.0 if d < 0 else 1.0)
-
-
-def _in_walls(
-    walls: NDArray, feet: NDArray, depth: NDArray, parameters: TableExtentParameters
-) -> NDArray[np.bool_]:
-    """Which points [...] lie in a wall, or behind one."""
-    inside = np.zeros(depth.shape, bool)
-    if len(walls):
-        thickness = _thickness(depth, parameters)
-    for x, y, d in walls.astype(np.float32):
-        inside |= feet[..., 0] * x + feet[..., 1] * y + d < thickness
-    return inside
 
 
 def _largest(wide: NDArray[np.bool_], feet: NDArray, gap: float) -> NDArray[np.bool_]:
@@ -278,16 +200,10 @@ def _standing_on(
     feet = _feet(frame, along, 2)
     with np.errstate(invalid="ignore"):
         off = ((few > height_min) | (few < -parameters.sunk)) & ~frame.robot[::2, ::2]
-    off &= ~_in_walls(walls, feet, depth, parameters)
+    whole = off & ~in_walls(walls, feet, depth, parameters.walls)
     step = np.float32(parameters.step) * np.maximum(depth, 1) ** 2
-    whole = off.copy()
-    for axis in (0, 1):
-        jump = np.abs(np.diff(depth, axis=axis))
-        cut = jump > (step[1:] if axis == 0 else step[:, 1:])
-        if axis == 0:
-            whole[1:] &= ~cut
-        else:
-            whole[:, 1:] &= ~cut
+    whole[1:] &= np.abs(np.diff(depth, axis=0)) <= step[1:]
+    whole[:, 1:] &= np.abs(np.diff(depth, axis=1)) <= step[:, 1:]
     number, label = cv2.connectedComponents(whole.astype(np.uint8), connectivity=4)
     with np.errstate(invalid="ignore"):
         inside, sunk, tall = (
