@@ -1,4 +1,7 @@
-"""PNG images of a recording: what their first bytes promise, and whether all of them is there."""
+"""Images of a recording: what their first bytes promise, and whether all of them is there.
+
+PNG; colour may be JPEG, too, as some data sets have it.
+"""
 
 import struct
 import zlib
@@ -47,25 +50,31 @@ def image_kind(path: Path) -> ImageKind | None:
     return ImageKind(width, height, _CHANNELS.get(color_type, 0), bits)
 
 
-def read_image(path: Path) -> NDArray:
-    """A whole PNG image as OpenCV decodes it: [H, W] or [H, W, channels], BGR.
+def read_image(path: Path, *, jpeg: bool = False) -> NDArray:
+    """A whole PNG image (or JPEG, where that will do) as OpenCV decodes it: [H, W] or [H, W, channels], BGR.
 
-    Raises DamagedImageError. Check sums are compared first: decoders fill up what is missing.
+    Raises DamagedImageError. That all is there is looked at first: decoders fill up what is missing.
     """
+    unreadable = f"{path} is not a readable PNG{' or JPEG' if jpeg else ''} image"
     try:
         content = path.read_bytes()
     except FileNotFoundError:
         raise DamagedImageError(f"{path} is missing") from None
     except OSError:
-        raise DamagedImageError(f"{path} is not a readable PNG image") from None
+        raise DamagedImageError(unreadable) from None
     try:
-        whole = _is_whole(content)
+        whole = _is_whole(content) or (jpeg and _is_whole_jpeg(content))
         image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED) if whole else None
     except cv2.error:
         image = None
     if image is None:
-        raise DamagedImageError(f"{path} is not a readable PNG image")
+        raise DamagedImageError(unreadable)
     return image
+
+
+def _is_whole_jpeg(content: bytes) -> bool:
+    """Whether a JPEG file begins and ends as one; it has no check sums."""
+    return content[:3] == b"\xff\xd8\xff" and content.rstrip(b"\0")[-2:] == b"\xff\xd9"
 
 
 def _is_whole(content: bytes) -> bool:

@@ -1,7 +1,7 @@
 """What lies where in a recording: the TUM RGB-D layout, with a camera file and optional extras.
 
     rgb.txt, depth.txt      timestamp file             (lines that begin with # are comments)
-    rgb/, depth/            PNG; depth 16 bit, 0 = invalid
+    rgb/, depth/            PNG; depth 16 bit, 0 = invalid; colour may be JPEG
     groundtruth.txt         timestamp tx ty tz qx qy qz qw     the camera's pose X_WC
     camera.json             width, height, fx, fy, cx, cy, depth_scale (units of depth per metre)
     joints.csv              timestamp,q1..q7                   optional

@@ -79,13 +79,13 @@ class RecordingReader:
         return (self.folder / folder).is_dir() and any((self.folder / folder).iterdir())
 
     def __iter__(self) -> Iterator[RecordedFrame]:
-        first_damage: DamagedImageError | None = None
+        first_damage = ""
         frames = 0
         for color, depth in self._frames:
             try:
                 frame = self._read(color, depth)
             except DamagedImageError as damage:
-                first_damage = first_damage or damage
+                first_damage = first_damage or f"line {color.line}: no frame can be read: {damage}"
                 self.leave_out(color, str(damage))
                 continue
             if frames == 0:
@@ -93,7 +93,7 @@ class RecordingReader:
             frames += 1
             yield frame
         if frames == 0:
-            raise RecordingError(f"{self._color_list}: no frame can be read: {first_damage}")
+            raise RecordingError(f"{self._color_list}: {first_damage}")
 
     def _read(self, color: ListedFile, depth: ListedFile) -> RecordedFrame:
         robot = self._read_beside(layout.ROBOT_FOLDER, color.name)
@@ -233,7 +233,7 @@ class RecordingReader:
             )
 
     def _read_color(self, name: str) -> NDArray[np.uint8]:
-        image = read_image(self.folder / name)
+        image = read_image(self.folder / name, jpeg=True)
         if image.dtype != np.uint8 or image.ndim != 3:
             raise RecordingError(f"{self.folder / name}: colour images have 3 channels of 8 bits")
         self._check_size(image.shape[:2], str(self.folder / name))
@@ -266,7 +266,7 @@ class RecordingReader:
 
 def _read_camera(path: Path) -> tuple[Intrinsics, float]:
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise RecordingError(
             f"{path} is missing; it holds width, height, fx, fy, cx, cy, depth_scale"

@@ -165,7 +165,7 @@ def _number(cell: str, path: Path, line: int) -> float:
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")  # some editors begin a file with a mark
     except FileNotFoundError:
         raise RecordingError(f"{path} is missing") from None
     except (OSError, UnicodeDecodeError, ValueError):

@@ -17,7 +17,7 @@ from riseg_drake.geometry.plane import (
     transform_plane,
 )
 from riseg_drake.geometry.rgbd import Frame, Immutable
-from riseg_drake.segmentation.table_extent import off_table
+from riseg_drake.segmentation.table_extent import TableExtentParameters, on_this_table
 
 _COLOR_SPREAD_MIN = 4.0
 """Gray levels; a table's colour is not known better than that."""
@@ -35,9 +35,12 @@ class AboveTableParameters:
     height_min: float = 0.004
     """m; what is lower is table."""
     noise_multiple: float = 4.0
-    """What is lower than so many standard deviations of the depth seen on the table is table, too."""
+    """What is nowhere higher than so many standard deviations of the depth seen on the table is table."""
+    foot_multiple: float = 2.0
+    """The foot of what rises higher than that is as high as so many of them."""
     area_min: float = 1.0e-4
     """m^2; a smaller piece is noise, not an object."""
+    extent: TableExtentParameters = field(default_factory=TableExtentParameters)
 
 
 @dataclass(frozen=True)
@@ -75,18 +78,13 @@ def objects_above_table(frame: Frame, parameters: AboveTableParameters) -> Above
     height = heights_above_plane(frame.depth, frame.intrinsics, plane_C)
     on_table = _on_table(height, frame, parameters)
     depth_noise = _depth_noise(height, frame.depth, on_table, parameters)
-    low = np.maximum(
-        np.float32(parameters.height_min),
-        np.float32(parameters.noise_multiple * depth_noise) * frame.depth**2,
-    )
-    with np.errstate(invalid="ignore"):
-        high = (height > low) & seen
-    elsewhere = off_table(frame, height, plane_C, on_table, parameters.height_min)
-    if elsewhere is not None:
-        high &= ~elsewhere
+    high, clearly = _high(height, frame, depth_noise, parameters)
+    belonging = on_this_table(frame, height, plane_C, on_table, parameters.height_min, parameters.extent)
+    if belonging is not None:
+        high &= belonging
     z = frame.depth[high]
     distance = float(np.median(z)) if len(z) else 1.0
-    mask = _without_specks(high, frame, on_table, parameters.area_min / distance**2)
+    mask = _without_specks(high, clearly, frame, on_table, parameters.area_min / distance**2)
     return AboveTable(mask, height, transform_plane(frame.X_WC, plane_C), depth_noise, distance)
 
 
@@ -114,19 +112,40 @@ def _depth_noise(
     return max(float(np.sqrt(np.mean((h / z**2) ** 2))), _DEPTH_NOISE_MIN)
 
 
+def _high(
+    height: NDArray[np.float32], frame: Frame, depth_noise: float, parameters: AboveTableParameters
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_] | None]:
+    """What may stand on the table [H, W], and what surely does; None where that is the same."""
+    clear, foot = (
+        np.float32(multiple * depth_noise) for multiple in (parameters.noise_multiple, parameters.foot_multiple)
+    )
+    lowest = np.float32(parameters.height_min)
+    with np.errstate(invalid="ignore"):
+        if clear * frame.depth.max() ** 2 <= lowest:
+            return (height > lowest) & ~frame.robot, None
+        z_squared = frame.depth**2
+        high = (height > np.maximum(lowest, foot * z_squared)) & ~frame.robot
+        return high, high & (height > clear * z_squared)
+
+
 def _looks_like_table(color: NDArray[np.uint8], frame: Frame, on_table: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which pixels of an image [H, W, 3] may be the table's, given which of the frame's every fifth are."""
+    """Which of N colours [N, 3] may be the table's, given which of the frame's every fifth pixel are."""
     if np.count_nonzero(on_table) < 100:
-        return np.ones(color.shape[:2], bool)
+        return np.ones(len(color), bool)
     mean, spread = cv2.meanStdDev(np.ascontiguousarray(frame.color[_every(5)]), mask=on_table.view(np.uint8))
     reach = _TABLE_SIGMAS * np.maximum(spread, _COLOR_SPREAD_MIN)
-    return cv2.inRange(color, mean - reach, mean + reach) > 0
+    return (np.abs(color - mean[:, 0]) <= reach[:, 0]).all(1)
 
 
 def _without_specks(
-    mask: NDArray[np.bool_], frame: Frame, on_table: NDArray[np.bool_], area_min: float
+    mask: NDArray[np.bool_],
+    clearly: NDArray[np.bool_] | None,
+    frame: Frame,
+    on_table: NDArray[np.bool_],
+    area_min: float,
 ) -> NDArray[np.bool_]:
-    """Close pinholes, add the rim without depth, drop pieces that look smaller than `area_min` (m^2 at 1 m)."""
+    """Close pinholes, add the rim and the holes without depth, drop pieces that look smaller than `area_min`
+    (m^2 at 1 m), or of which less than that rises clearly."""
     out = np.zeros_like(mask)
     if not mask.any():
         return out
@@ -135,12 +154,27 @@ def _without_specks(
     closed = cv2.morphologyEx(mask[region].astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     # Stereo has no depth on the last pixels before an edge, nor on the first behind it. Colour tells which
     # are the object's, where the table has a colour of its own.
-    rim = (cv2.dilate(closed, np.ones((3, 3), np.uint8)) > closed) & (depth == 0)
-    closed |= rim & ~_looks_like_table(color, frame, on_table)
-    closed[robot] = 0
-    _, label, stats, _ = cv2.connectedComponentsWithStats(closed, connectivity=4)
+    rim = np.nonzero((cv2.dilate(closed, np.ones((3, 3), np.uint8)) > closed) & (depth == 0))
+    closed[rim] = ~_looks_like_table(color[rim], frame, on_table)
+    closed |= _enclosed((depth == 0) & (closed == 0), closed)
+    np.copyto(closed, 0, where=robot)
+    number, label, stats, _ = cv2.connectedComponentsWithStats(closed, connectivity=4)
     pixels_min = area_min * frame.intrinsics.fx * frame.intrinsics.fy
     keep = stats[:, cv2.CC_STAT_AREA] >= pixels_min
+    if clearly is not None:
+        keep &= np.bincount(label[clearly[region]], minlength=number) >= pixels_min
     keep[0] = False
-    out[region] = keep[label]
+    out[region] = keep.take(label)
     return out
+
+
+def _enclosed(holes: NDArray[np.bool_], around: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Those of the holes [H, W] that border on nothing but what is 1."""
+    number, label = cv2.connectedComponents(holes.view(np.uint8), connectivity=4)
+    outside = cv2.dilate((~holes & (around == 0)).view(np.uint8), np.ones((3, 3), np.uint8))
+    beside = cv2.bitwise_and(outside, holes.view(np.uint8)).view(bool)
+    keep = np.ones(number, bool)
+    for open_label in (label[beside], label[0], label[-1], label[:, 0], label[:, -1]):
+        keep[open_label] = False
+    keep[0] = False
+    return keep.take(label)

@@ -19,8 +19,9 @@ class FramePairParameters:
 
     kind: str = field(default="motion", metadata={"choices": ("motion", "consecutive")})
     """"motion" or, as in the paper, "consecutive"."""
-    flow_span: float = 20.0
-    """Effective flow, pixels, after which the reference is renewed."""
+    flow_span: float = 0.031
+    """Effective flow, as a share of the image's width, after which the reference is renewed: 20 pixels of
+    640."""
     moving: float = 0.5
     """Effective flow, pixels, from which something moves."""
     camera_span_moving: float = 0.08
@@ -50,7 +51,7 @@ def next_pair(
     if parameters.kind == "consecutive":
         return FramePair(pair.current, frame)
     if flow_span >= parameters.moving:
-        renew = flow_span > parameters.flow_span
+        renew = flow_span > parameters.flow_span * frame.intrinsics.width
         share = parameters.camera_span_moving
     else:
         renew = frame.time - pair.reference.time > parameters.age_still

@@ -6,7 +6,6 @@ from scipy.spatial.transform import Rotation
 
 from riseg_drake.geometry.camera import Intrinsics, back_project, rays
 from riseg_drake.geometry.plane import (
-    PlaneFitParameters,
     fit_plane,
     heights_above_plane,
     transform_plane,
@@ -67,16 +66,20 @@ def test_bigger_flat_top_loses_against_the_table_below_it() -> None:
     np.testing.assert_allclose(found_C, plane_C, atol=1e-5)
 
 
-def test_prior_normal_chooses_the_table_beside_a_bigger_wall() -> None:
-    table_C, wall_C = tilted_plane(0.0, 0.5), tilted_plane(1.1, 0.5)
-    depth = np.minimum(depth_of_plane(table_C), depth_of_plane(wall_C))
-    depth[depth <= 0] = 0
-    found_C = fit_plane(
-        depth, CAMERA, np.random.default_rng(0), PlaneFitParameters(below_penalty=0.0),
-        prior_normal_C=np.array([0.0, 0.0, -1.0]),
-    )  # fmt: skip
-    # The wall's points next to the corner count as table points: no closer than that.
-    assert angle_between(found_C, table_C) < np.deg2rad(0.1)
+def test_a_table_is_chosen_beside_a_bigger_wall_and_over_a_bigger_floor() -> None:
+    elevation = np.radians(40)
+    up = np.array([0.0, -np.cos(elevation), -np.sin(elevation)])
+    back = np.array([0.0, np.sin(elevation), -np.cos(elevation)])
+    table_C, floor_C, wall_C = np.append(up, 0.7), np.append(up, 1.42), np.append(back, 1.4)
+    table, floor, wall = (
+        np.where(depth > 0, depth, np.inf) for depth in map(depth_of_plane, (table_C, floor_C, wall_C))
+    )
+    v, u = np.mgrid[:480, :640]
+    depth = np.minimum(floor, wall)
+    depth[(v > 200) & (v < 400) & (u > 160) & (u < 480)] = table[(v > 200) & (v < 400) & (u > 160) & (u < 480)]
+    found_C = fit_plane(with_noise(depth, np.random.default_rng(0)), CAMERA, np.random.default_rng(0))
+    assert angle_between(found_C, table_C) < np.radians(0.5)
+    assert abs(found_C[3] - table_C[3]) < 0.005
 
 
 def test_same_seed_gives_the_same_plane() -> None:

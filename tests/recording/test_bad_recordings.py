@@ -127,3 +127,23 @@ def test_a_pose_between_two_rows_is_between_them(recording):
     (frame,) = RecordingReader(recording)
     np.testing.assert_allclose(frame.X_WC[:3, 3], [0.05, 0, 0], atol=1e-9)
     assert np.degrees(np.arctan2(frame.X_WC[1, 0], frame.X_WC[0, 0])) == pytest.approx(2.5, abs=1e-4)
+
+
+def test_colour_may_be_jpeg_and_a_jpeg_that_was_cut_off_is_left_out(recording):
+    for path in sorted((recording / "rgb").glob("*.png")):
+        cv2.imwrite(str(path.with_suffix(".jpg")), cv2.imread(str(path)))
+        path.unlink()
+    lines_of(recording / "rgb.txt", lambda lines: [line.replace(".png", ".jpg") for line in lines])
+    cut = recording / "rgb" / "000003.jpg"
+    cut.write_bytes(cut.read_bytes()[:-40])
+    reader = RecordingReader(recording)
+    assert len(list(reader)) == 5
+    assert [line.line for line in reader.left_out] == [5]
+    assert "PNG or JPEG" in reader.left_out[0].why
+
+
+@pytest.mark.parametrize("name", ["rgb.txt", "depth.txt", "groundtruth.txt", "camera.json"])
+def test_a_mark_at_a_files_beginning_and_line_ends_of_windows_do_no_harm(recording, name):
+    path = recording / name
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n"))
+    assert len(list(RecordingReader(recording))) == 6

@@ -13,18 +13,22 @@ from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.recording.layout import RecordedFrame
 from riseg_drake.systems.frame_view import FrameView
+from tests.recording.hand_held import Faults, hand_held_film
 from tests.recording.moved_objects import moved_film, sideways
+from tests.segmentation.drawn_room import VGA as DRAWN_VGA
 from tests.segmentation.drawn_scene import CAMERA, Blank, DrawnScene, Texture, looking_down, planar
 
 pytestmark = pytest.mark.renders
 
 VGA = Intrinsics(640, 480, 616.2, 615.8, 316.4, 238.8)
+QUARTER = Intrinsics(160, 120, 154.1, 153.9, 79.0, 59.7)
 SIZES = [(0.07, 0.06, 0.03), (0.06, 0.08, 0.05), (0.05, 0.05, 0.04)]
 PLACES = [planar(-0.08, 0.03, 0.3), planar(0.05, 0.05), planar(0.02, -0.07, 1.0)]
 
 
 @pytest.mark.parametrize(
-    ("speed", "frames", "intrinsics"), [(0.5, 16, CAMERA), (2.0, 8, CAMERA), (5.0, 7, VGA)]
+    ("speed", "frames", "intrinsics"),
+    [(0.5, 16, CAMERA), (2.0, 8, CAMERA), (5.0, 6, CAMERA), (5.0, 7, VGA)],
 )
 @pytest.mark.parametrize("tilt", [0.0, 0.5], ids=["from above", "from beside"])
 def test_each_object_that_moves_is_found_with_overlap_f_above_85(speed, frames, intrinsics, tilt) -> None:
@@ -42,6 +46,24 @@ def test_each_object_that_moves_is_found_with_overlap_f_above_85(speed, frames, 
         mask = replay.mask_after(film_frame)
     truth = np.where(np.isin(film_frame.labels, list(twists)), film_frame.labels, 0)
     scores = score(mask, truth)
+    assert scores.objects_found == 2
+    assert scores.overlap_f >= 0.85
+
+
+def test_in_a_narrow_image_what_moves_by_6_pixels_a_frame_stays_whole() -> None:
+    frame, labels = DrawnScene(SIZES, intrinsics=QUARTER).frame(
+        0, looking_down(), PLACES, np.random.default_rng(0)
+    )
+    twists = {
+        i: sideways(6 * np.array(direction), float(np.median(frame.depth[labels == i])), QUARTER, 0.005)
+        for i, direction in {1: (-0.9, 0.4), 3: (0.3, 0.95)}.items()
+    }
+    replay = Replay(Scenario(), FrameView(QUARTER, None, None), seed=0)
+    for film_frame in moved_film(
+        frame.color, frame.depth, labels, QUARTER, twists, 6, np.random.default_rng(1)
+    ):
+        mask = replay.mask_after(film_frame)
+    scores = score(mask, np.where(np.isin(film_frame.labels, list(twists)), film_frame.labels, 0))
     assert scores.objects_found == 2
     assert scores.overlap_f >= 0.85
 
@@ -131,4 +153,15 @@ def test_nothing_is_found_where_nothing_moves_though_poses_err(table) -> None:
         error[:3, 3] = 0.001 * rng.normal(size=3)
         mask = replay.mask_after(RecordedFrame(k / 15, frame.color, frame.depth, X_WC @ error))
         assert not mask.any()
+    assert replay.segmentation.object_ids == ()
+
+
+@pytest.mark.parametrize(("table", "boxes"), [("wood", "blotches"), ("checks", "wood"), ("blank", "blotches")])
+def test_a_camera_in_a_hand_finds_nothing_where_nothing_moves_whatever_is_wrong_with_it(table, boxes) -> None:
+    wrong = Faults(
+        noise=(0.001, 0.05), drift=(0.005, 0.3), hand_eye=(0.005, 0.5), blur=0.015, late=0.01, exposure=0.15
+    )
+    replay = Replay(Scenario(), FrameView(DRAWN_VGA, None, None), seed=0)
+    for frame in hand_held_film(table, boxes, wrong, frames=12, seed=0):
+        assert not replay.mask_after(frame).any()
     assert replay.segmentation.object_ids == ()

@@ -1,5 +1,6 @@
 """objMask on drawn depth: what stands there is found, and neither the table nor the robot."""
 
+import zlib
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from riseg_drake.geometry.camera import rays
 from riseg_drake.segmentation.above_table import AboveTableParameters, objects_above_table
+from tests.segmentation.drawn_room import KINDS, draw_room
 from tests.segmentation.drawn_scene import CAMERA, DrawnScene, Texture, looking_down, planar
 
 LOW_BOXES = [(0.06, 0.05, 0.015), (0.05, 0.08, 0.015), (0.04, 0.04, 0.05)]
@@ -140,3 +142,28 @@ def test_a_coloured_table_seen_from_beside_with_the_room_around_it_is_the_table(
     hit = np.count_nonzero(above.mask & (label > 0))
     assert hit / np.count_nonzero(label > 0) >= 0.9
     assert hit / np.count_nonzero(above.mask) >= 0.8
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "a fifth"])
+def test_objects_in_rooms_as_data_sets_show_them_are_covered_and_little_else(kind: str) -> None:
+    hit = standing = marked = 0
+    for seed in range(3):
+        frame, label, _ = draw_room(KINDS[kind], np.random.default_rng([seed, zlib.crc32(kind.encode())]))
+        above = objects_above_table(frame, AboveTableParameters())
+        assert above.plane_W[2] > np.cos(np.radians(1.0))
+        assert abs(above.plane_W[3]) < 0.02
+        hit += np.count_nonzero(above.mask & (label > 0))
+        standing += np.count_nonzero(label)
+        marked += np.count_nonzero(above.mask)
+    assert hit / standing >= 0.9
+    assert hit / marked >= 0.8
+
+
+def test_an_object_that_touches_the_wall_is_found_and_the_wall_is_not() -> None:
+    room = KINDS["wall, stereo"]
+    frame, label, _ = draw_room(room, np.random.default_rng(4))
+    above = objects_above_table(frame, AboveTableParameters())
+    wall = (label == 0) & (above.height > 0.05)
+    assert np.mean(wall) > 0.2
+    assert np.mean(above.mask[wall]) < 0.02
+    assert np.mean(above.mask[label > 0]) > 0.9

@@ -49,12 +49,12 @@ def test_consecutive_pairs_are_the_papers() -> None:
 
 def test_the_reference_stays_while_things_move_and_is_renewed_beyond_the_span() -> None:
     frames = [frame(k) for k in range(7)]
-    assert references(frames, [0, 1, 4, 7, 11, 2, 4], flow_span=10.0) == [0, 0, 0, 0, 0, 4, 4]
+    assert references(frames, [0, 1, 4, 7, 11, 2, 4], flow_span=10.0 / CAMERA.width) == [0, 0, 0, 0, 0, 4, 4]
 
 
 def test_motion_keeps_an_old_reference_and_stillness_does_not() -> None:
     frames = [frame(k, rate=2.0) for k in range(7)]
-    assert references(frames, [3.0] * 7, age_still=1.2) == [0] * 7
+    assert references(frames, [1.5] * 7, age_still=1.2) == [0] * 7
     assert references(frames, [0.0] * 7, age_still=1.2) == [0, 0, 0, 2, 2, 4, 4]
 
 
@@ -63,7 +63,7 @@ def test_the_camera_may_go_farther_while_something_moves() -> None:
     metre = CAMERA.width * DEPTH / CAMERA.fx
     frames = [frame(k, looking_down(x=0.03 * k * metre)) for k in range(5)]
     spans = {"camera_span_moving": 0.07, "camera_span_still": 0.02}
-    assert references(frames, [3.0] * 5, **spans) == [0, 0, 0, 2, 2]
+    assert references(frames, [1.5] * 5, **spans) == [0, 0, 0, 2, 2]
     assert references(frames, [0.0] * 5, **spans) == [0, 0, 1, 2, 3]
 
 
