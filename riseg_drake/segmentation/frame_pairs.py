@@ -19,7 +19,7 @@ class FramePairParameters:
 
     kind: str = field(default="motion", metadata={"choices": ("motion", "consecutive")})
     """"motion" or, as in the paper, "consecutive"."""
-    flow_span: float = 0.031
+    flow_span_share: float = 0.03125
     """Effective flow, as a share of the image's width, after which the reference is renewed: 20 pixels of
     640."""
     moving: float = 0.5
@@ -51,7 +51,7 @@ def next_pair(
     if parameters.kind == "consecutive":
         return FramePair(pair.current, frame)
     if flow_span >= parameters.moving:
-        renew = flow_span > parameters.flow_span * frame.intrinsics.width
+        renew = flow_span > parameters.flow_span_share * frame.intrinsics.width
         share = parameters.camera_span_moving
     else:
         renew = frame.time - pair.reference.time > parameters.age_still

@@ -49,7 +49,8 @@ def test_consecutive_pairs_are_the_papers() -> None:
 
 def test_the_reference_stays_while_things_move_and_is_renewed_beyond_the_span() -> None:
     frames = [frame(k) for k in range(7)]
-    assert references(frames, [0, 1, 4, 7, 11, 2, 4], flow_span=10.0 / CAMERA.width) == [0, 0, 0, 0, 0, 4, 4]
+    share = 10.0 / CAMERA.width
+    assert references(frames, [0, 1, 4, 7, 11, 2, 4], flow_span_share=share) == [0, 0, 0, 0, 0, 4, 4]
 
 
 def test_motion_keeps_an_old_reference_and_stillness_does_not() -> None:

@@ -185,7 +185,7 @@ def test_consecutive_pairs_follow_each_other() -> None:
 @pytest.mark.parametrize(("found", "references"), [(5.0, [0, 0, 0, 0]), (50.0, [0, 0, 1, 2])])
 def test_the_flow_span_decides_whether_the_reference_stays(found: float, references: list[int]) -> None:
     far = {"camera_span_moving": 1e3, "camera_span_still": 1e3}
-    loop = Loop(found, flow_span=20.0 / CAMERA.width, **far)
+    loop = Loop(found, flow_span_share=20.0 / CAMERA.width, **far)
     pairs = [loop.at(tick * PERIOD + JUST_AFTER) for tick in range(4)]
     assert [number_in(pair.reference) for pair in pairs] == references
 
