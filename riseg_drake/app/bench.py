@@ -2,6 +2,7 @@
 
 import tracemalloc
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -20,6 +21,7 @@ from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.segmentation_block import STATION_PORTS, make_segmentation, panda_view
 from riseg_drake.app.tables import stage_table
 from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.learned.sam import SamParameters
 from riseg_drake.pushing.push import ArmPhase
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.systems.stage_clock import StageClock
@@ -33,10 +35,13 @@ StationOutputs = dict[str, Any]
 """What a station gave at one tick of the camera, by the names of the segmentation's inputs."""
 
 
-def bench_command(scenario_file: Path | None, seed: int, stream: int | None, console: Console) -> None:
+def bench_command(
+    scenario_file: Path | None, seed: int, stream: int | None, sam: bool, console: Console
+) -> None:
     """Render one push, put it through the segmentation again and again, print what it cost.
 
-    With `stream` say instead how evenly commands come for so many seconds beside that.
+    With `stream` say instead how evenly commands come for so many seconds beside that, with `sam` what frames
+    lose while Segment Anything works beside them.
     """
     scenario = load_scenario(scenario_file)
     _ = scenario.simulated  # says so where it is not
@@ -49,6 +54,10 @@ def bench_command(scenario_file: Path | None, seed: int, stream: int | None, con
         with console.status(f"sending commands for {stream} s"):
             bench_stream(scenario, images, stream, console)
         return
+    if sam:
+        from riseg_drake.app.sam_bench import bench_sam
+
+        return bench_sam(scenario, images, console)
     with console.status("measuring time"):
         clock = StageClock()
         for _ in range(REPETITIONS):
@@ -73,7 +82,7 @@ def bench_command(scenario_file: Path | None, seed: int, stream: int | None, con
 
 def push_images(scenario: Scenario, seed: int) -> list[StationOutputs]:
     """The station's outputs at every frame of the first push. Raises ScenarioError if there is none."""
-    wired = make_diagram(scenario, seed)
+    wired = make_diagram(replace(scenario, sam=SamParameters()), seed)  # sharper outlines are not wanted here
     progress = Progress()
     images: list[StationOutputs] = []
 

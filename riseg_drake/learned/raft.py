@@ -110,7 +110,9 @@ class Correlation:
 
     def __init__(self, features_0: Tensor, features_1: Tensor, radius: int) -> None:
         n, channels, h, w = features_0.shape
-        dots = features_0.flatten(2).transpose(1, 2) @ features_1.flatten(2)
+        # Differences between good matches are small: full precision here, whatever the network has elsewhere.
+        with torch.autocast(features_0.device.type, enabled=False):
+            dots = features_0.flatten(2).transpose(1, 2) @ features_1.flatten(2)
         level = (dots / channels**0.5).view(n * h * w, 1, h, w)
         self._levels = [level]
         for _ in range(PYRAMID_LEVELS - 1):
