@@ -1,8 +1,8 @@
 """Trains RAFT small on drawn rigid motion: modest weights, made in minutes, without any public ones.
 
 As in the RAFT paper (section 3.4): L1 distance to the true flow after every iteration, later ones counting
-more, AdamW with one cycle of the learning rate, gradients clipped. Convolutions are in bfloat16, with the
-channels of a pixel side by side: that takes a third of the time on a processor that knows this format. Imports torch.
+more, AdamW with one cycle of the learning rate, gradients clipped. Convolutions are in bfloat16: a processor
+that knows this format takes a fifth less time for a step. Imports torch.
 """
 
 from collections.abc import Callable, Sequence
@@ -53,8 +53,7 @@ def train(seed: int, parameters: TrainingParameters, tell: Tell = lambda step, e
     """
     torch.manual_seed(seed)
     rng = np.random.default_rng([seed, 0])
-    layout = torch.channels_last
-    network = Raft(RAFT_SMALL).train().to(memory_format=layout)
+    network = Raft(RAFT_SMALL).train()
     optimizer = torch.optim.AdamW(
         network.parameters(), lr=parameters.learning_rate, weight_decay=parameters.weight_decay, fused=True
     )
@@ -69,7 +68,7 @@ def train(seed: int, parameters: TrainingParameters, tell: Tell = lambda step, e
     for step in range(1, parameters.steps + 1):
         pairs = [draw_pair(rng, parameters.pairs) for _ in range(parameters.batch)]
         image_0, image_1 = (
-            torch.cat([to_image_tensor(color) for color in colors]).to(memory_format=layout)
+            torch.cat([to_image_tensor(color) for color in colors])
             for colors in ([p.color_0 for p in pairs], [p.color_1 for p in pairs])
         )
         true_flow = torch.stack([torch.from_numpy(pair.flow).permute(2, 0, 1) for pair in pairs])

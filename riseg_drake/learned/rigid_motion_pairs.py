@@ -1,8 +1,9 @@
 """Image pairs of bodies that move rigidly over a table, drawn, with the flow that they have: to learn from.
 
 Boxes and ellipsoids with waves, patches or one colour are met by each pixel's ray, so flow is exact. Some of
-them are blank: where nothing can be seen to move, the network must learn from edges and from what is around. The
-table has always a texture, if a faint one: on a blank one any flow would do, and the pipeline asks for none there.
+them are blank: where nothing can be seen to move, the network must learn from edges and from what is around.
+The table always has a texture, often a faint one: on a blank one any flow would do, and the pipeline asks for
+none there.
 """
 
 from dataclasses import dataclass
@@ -73,7 +74,7 @@ def draw_pair(rng: np.random.Generator, parameters: PairParameters) -> FlowPair:
         """Colour, depth and the number of the body (0: table)."""
         depth, number, normal_W = _see(intrinsics, X_WC, bodies, poses)
         p_WQ = move_points(X_WC, back_project(depth, intrinsics).astype(float))
-        color = paint_table.color(p_WQ)
+        color: NDArray = paint_table.color(p_WQ)
         for k, (body, X_WB) in enumerate(zip(bodies, poses, strict=True), start=1):
             here = number == k
             color[here] = body.paint.color(move_points(inverse(X_WB), p_WQ[here]))
@@ -101,7 +102,9 @@ class _Paint:
         if rng.random() < 0.3:
             self._base[:] = rng.uniform(120, 250)  # gray or white, as much is
         contrast = np.exp(rng.uniform(np.log(faintest), 0)) if faintest else 0.0
-        self._other = self._base + np.float32(contrast) * (rng.uniform(0, 255, 3).astype(np.float32) - self._base)
+        self._other = self._base + np.float32(contrast) * (
+            rng.uniform(0, 255, 3).astype(np.float32) - self._base
+        )
         self._steepness = rng.choice([0.4, 4.0])  # waves or patches
         lengths = np.exp(rng.uniform(np.log(0.006), np.log(0.05), 8))
         directions = rng.normal(size=(8, 3))

@@ -7,7 +7,6 @@ import pytest
 
 from riseg_drake.learned.model_error import ModelError, require
 
-
 THE_NETWORK_ITSELF = {f"riseg_drake.learned.{name}" for name in ("raft", "raft_checkpoint", "raft_training")}
 """What is imported only once somebody wants RAFT."""
 
