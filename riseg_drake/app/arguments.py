@@ -213,6 +213,9 @@ def command_line() -> argparse.ArgumentParser:
         "--stops", action="store_true", help="measure instead how soon a moving arm stands still, over LCM"
     )
     bench.add_argument("--raft", action="store_true", help="measure RAFT instead, small and large")
+    bench.add_argument(
+        "--sam", action="store_true", help="measure Segment Anything instead, and the frames beside it"
+    )
 
     diagram = _add(
         subparsers,

@@ -23,10 +23,13 @@ REPETITIONS = 4
 WHOLE = "whole pair"
 
 
-def bench_command(scenario_file: Path | None, seed: int, stream: int | None, console: Console) -> None:
+def bench_command(
+    scenario_file: Path | None, seed: int, stream: int | None, sam: bool, console: Console
+) -> None:
     """Render one push, put it through the segmentation again and again, print what it cost.
 
-    With `stream` say instead how evenly commands come for so many seconds beside that.
+    With `stream` say instead how evenly commands come for so many seconds beside that, with `sam` what frames
+    lose while Segment Anything works beside them.
     """
     scenario = load_scenario(scenario_file)
     _ = scenario.simulated  # says so where it is not
@@ -39,6 +42,10 @@ def bench_command(scenario_file: Path | None, seed: int, stream: int | None, con
         with console.status(f"sending commands for {stream} s"):
             bench_stream(scenario, images, stream, console)
         return
+    if sam:
+        from riseg_drake.app.sam_bench import bench_sam
+
+        return bench_sam(scenario, images, console)
     with console.status("measuring time"):
         clock = StageClock()
         for _ in range(REPETITIONS):

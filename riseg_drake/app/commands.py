@@ -107,7 +107,7 @@ def bench(chosen: argparse.Namespace, console: Console) -> None:
         return bench_stops(console)
     from riseg_drake.app.bench import bench_command
 
-    bench_command(chosen.scenario, chosen.seed, chosen.stream, console)
+    bench_command(chosen.scenario, chosen.seed, chosen.stream, chosen.sam, console)
 
 
 def diagram(chosen: argparse.Namespace, console: Console) -> None:

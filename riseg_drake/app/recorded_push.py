@@ -1,6 +1,7 @@
 """One push, held in memory: what the station gave at every picture, to be put through Alg. 2 again."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from pydrake.systems.analysis import Simulator
@@ -12,6 +13,7 @@ from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.segmentation_block import STATION_PORTS
 from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.learned.sam import SamParameters
 from riseg_drake.pushing.push import ArmPhase
 from riseg_drake.systems.stage_clock import StageClock
 
@@ -21,7 +23,7 @@ StationOutputs = dict[str, Any]
 
 def push_images(scenario: Scenario, seed: int) -> list[StationOutputs]:
     """The station's outputs at every frame of the first push. Raises ScenarioError if there is none."""
-    wired = make_diagram(scenario, seed)
+    wired = make_diagram(replace(scenario, sam=SamParameters()), seed)  # sharper outlines are not wanted here
     progress = Progress()
     images: list[StationOutputs] = []
 

@@ -7,7 +7,8 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,11 @@ from riseg_drake.learned.raft_flow import RaftFlow
 from riseg_drake.learned.rigid_motion_pairs import PairParameters, draw_pair
 from riseg_drake.segmentation.optical_flow import DisFlow, FlowMethod
 
+if TYPE_CHECKING:
+    from riseg_drake.learned.raft import Raft
+
+TELL_EVERY = 200
+"""Steps."""
 UNSEEN_PAIRS = 100
 _LIKE_TRAINING = PairParameters()
 UNSEEN = {
@@ -34,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("output", type=Path, metavar="FILE", help="the checkpoint to write")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="draws weights and pairs (0)")
-    parser.add_argument("--steps", type=int, metavar="N", help="of training (4000)")
+    parser.add_argument("--steps", type=int, metavar="N", help="of training (8000)")
     parser.add_argument("--threads", type=int, default=1, metavar="N", help="for torch (1)")
     chosen = parser.parse_args(arguments)
     console = Console()
@@ -51,17 +57,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parameters = replace(parameters, steps=chosen.steps)
     start, recent = perf_counter(), []
 
-    def tell(step: int, error: float) -> None:
+    def tell(step: int, error: float, network: "Raft") -> None:
         recent.append(error)
-        if step % 100 == 0 or step == parameters.steps:
+        if step % TELL_EVERY == 0 or step == parameters.steps:
+            save(network, chosen.output)  # so far: who stops it has something
             console.print(
                 f"step {step} of {parameters.steps}: end-point error {np.mean(recent):.2f} px, "
-                f"{perf_counter() - start:.0f} s"
+                f"{perf_counter() - start:.0f} s, {process_time():.0f} s of processor time"
             )
             recent.clear()
 
     network = train(chosen.seed, parameters, tell)
-    save(network, chosen.output)
     console.print(f"{chosen.output} written after {(perf_counter() - start) / 60:.1f} minutes")
     report(RaftFlow(network, device="cpu"), chosen.seed, console)
     return 0

@@ -5,6 +5,7 @@ and again, how well the pixels around the present guess agree, and corrects it. 
 might need it imports `raft_flow` instead.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
@@ -14,8 +15,8 @@ from torch.nn import functional
 PYRAMID_LEVELS = 4
 STRIDE = 8
 """Pixels of the image for one of the feature maps."""
-SMALLEST_SIDE = STRIDE * 2**PYRAMID_LEVELS
-"""Pixels; in a smaller image the top of the pyramid would be empty."""
+Norm = Callable[[int], nn.Module]
+"""Makes the normalisation of so many channels."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,8 @@ class Raft(nn.Module):
         In training there is one after each iteration, the last being the best; otherwise only the last.
 
         Args:
-            image_0: [N, 3, H, W] in [-1, 1]; H and W are multiples of 8, from 128 up.
+            image_0: [N, 3, H, W] in [-1, 1]; H and W are multiples of 8, from 128 up: in a smaller image the
+                top of the pyramid would be empty.
             image_1: the same.
             iterations: corrections of the flow.
         """
@@ -110,7 +112,9 @@ class Correlation:
 
     def __init__(self, features_0: Tensor, features_1: Tensor, radius: int) -> None:
         n, channels, h, w = features_0.shape
-        dots = features_0.flatten(2).transpose(1, 2) @ features_1.flatten(2)
+        # Differences between good matches are small: full precision here, whatever the network has elsewhere.
+        with torch.autocast(features_0.device.type, enabled=False):
+            dots = features_0.flatten(2).transpose(1, 2) @ features_1.flatten(2)
         level = (dots / channels**0.5).view(n * h * w, 1, h, w)
         self._levels = [level]
         for _ in range(PYRAMID_LEVELS - 1):
@@ -147,7 +151,9 @@ def _pixels(n: int, h: int, w: int, device: torch.device) -> Tensor:
 class _NormedConv(nn.Module):
     """Convolution, normalisation and, where wanted, a rectifier."""
 
-    def __init__(self, channels_in: int, channels: int, kernel: int, stride: int, norm, relu: bool = True):  # type: ignore[no-untyped-def]
+    def __init__(
+        self, channels_in: int, channels: int, kernel: int, stride: int, norm: Norm, relu: bool = True
+    ) -> None:
         super().__init__()
         self.conv = nn.Conv2d(channels_in, channels, kernel, stride, padding=kernel // 2)
         self.norm = norm(channels)
@@ -161,7 +167,7 @@ class _NormedConv(nn.Module):
 class _Residual(nn.Module):
     """What a few convolutions add to their input; the small network's go through a bottleneck."""
 
-    def __init__(self, channels_in: int, channels: int, stride: int, size: RaftSize, norm) -> None:  # type: ignore[no-untyped-def]
+    def __init__(self, channels_in: int, channels: int, stride: int, size: RaftSize, norm: Norm) -> None:
         super().__init__()
         if size.is_large:
             shapes = [(channels_in, channels, 3, stride), (channels, channels, 3, 1)]
@@ -180,7 +186,7 @@ class _Residual(nn.Module):
 class _Encoder(nn.Module):
     """An image [N, 3, H, W] to features [N, channels, H / 8, W / 8]."""
 
-    def __init__(self, size: RaftSize, channels: int, norm) -> None:  # type: ignore[no-untyped-def]
+    def __init__(self, size: RaftSize, channels: int, norm: Norm) -> None:
         super().__init__()
         self.stem = _NormedConv(3, size.stem, 7, 2, norm)
         widths = (size.stem, *size.stages)

@@ -37,9 +37,12 @@ def read_checkpoint(path: Path) -> dict[str, Tensor]:
         raise ModelError(f"{path} is not there; give the file of a RAFT checkpoint (see docs/learned.md)")
     try:
         content = torch.load(path, map_location="cpu", weights_only=True)
-    except Exception as error:  # pickle, zip and torch each have their own
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise ModelError(f"{path} is no checkpoint that can be loaded as plain tensors ({reason})") from None
+    except Exception as error:
+        # pickle, zip and torch each have their own, and torch's words advise to run what is in the file.
+        raise ModelError(
+            f"{path} is no checkpoint that can be loaded as plain tensors, which is all that is loaded here "
+            f"({type(error).__name__})"
+        ) from None
     if not isinstance(content, Mapping) or not all(isinstance(t, Tensor) for t in content.values()):
         raise ModelError(f"{path} holds no state dict: it must be names and tensors, nothing else")
     return dict(content)

@@ -75,6 +75,9 @@ def pad(color: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def margins(length: int) -> tuple[int, int]:
-    """Pixels to add before and after a side of so many, to reach a multiple of 8, and 128 at least."""
+    """Pixels to add before and after a side of so many, to reach a multiple of 8, and 128 at least.
+
+    As `Raft` wants it: eight pixels make one of its features, and sixteen features fill its pyramid.
+    """
     missing = max(128, -(-length // 8) * 8) - length
     return missing // 2, missing - missing // 2

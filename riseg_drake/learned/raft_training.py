@@ -1,7 +1,8 @@
 """Trains RAFT small on drawn rigid motion: modest weights, made in minutes, without any public ones.
 
 As in the RAFT paper (section 3.4): L1 distance to the true flow after every iteration, later ones counting
-more, AdamW with one cycle of the learning rate, gradients clipped. Imports torch.
+more, AdamW with one cycle of the learning rate, gradients clipped. Convolutions are in bfloat16: a processor
+that knows this format takes a fifth less time for a step. Imports torch.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,13 +24,13 @@ from riseg_drake.learned.rigid_motion_pairs import FlowPair, PairParameters, dra
 class TrainingParameters:
     """Twenty minutes on one core."""
 
-    steps: int = 4000
+    steps: int = 8000
     batch: int = 2
     """Pairs in a step."""
     iterations: int = 5
     """Corrections of the flow in training (paper: 12)."""
-    learning_rate: float = 4e-4
-    """At its highest (as in the paper)."""
+    learning_rate: float = 1e-3
+    """At its highest (paper: 4e-4, for far longer); learns faster in the few steps there are."""
     weight_decay: float = 1e-5
     """Of AdamW."""
     decay: float = 0.8
@@ -39,24 +40,31 @@ class TrainingParameters:
     pairs: PairParameters = field(default_factory=PairParameters)
 
 
-def train(
-    seed: int, parameters: TrainingParameters, tell: Callable[[int, float], None] = lambda step, error: None
-) -> Raft:
+Tell = Callable[[int, float, Raft], None]
+"""Is called after every step with its number, from 1, its end-point error, pixels, and the network so far."""
+
+
+def train(seed: int, parameters: TrainingParameters, tell: Tell = lambda step, error, network: None) -> Raft:
     """A network trained on pairs drawn from `seed`.
 
     Args:
         seed: of the first weights and of the pairs; the same gives the same network on the same machine.
         parameters: see there.
-        tell: is called after every step with its number, from 1, and its end-point error, pixels.
+        tell: follows how it goes.
     """
     torch.manual_seed(seed)
     rng = np.random.default_rng([seed, 0])
     network = Raft(RAFT_SMALL).train()
     optimizer = torch.optim.AdamW(
-        network.parameters(), lr=parameters.learning_rate, weight_decay=parameters.weight_decay
+        network.parameters(), lr=parameters.learning_rate, weight_decay=parameters.weight_decay, fused=True
     )
-    schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimizer, parameters.learning_rate, total_steps=parameters.steps + 1, pct_start=0.05
+    schedule = torch.optim.lr_scheduler.OneCycleLR(  # as the authors' code has it
+        optimizer,
+        parameters.learning_rate,
+        total_steps=parameters.steps + 1,
+        pct_start=0.05,
+        anneal_strategy="linear",
+        cycle_momentum=False,
     )
     for step in range(1, parameters.steps + 1):
         pairs = [draw_pair(rng, parameters.pairs) for _ in range(parameters.batch)]
@@ -65,7 +73,8 @@ def train(
             for colors in ([p.color_0 for p in pairs], [p.color_1 for p in pairs])
         )
         true_flow = torch.stack([torch.from_numpy(pair.flow).permute(2, 0, 1) for pair in pairs])
-        flows = network(image_0, image_1, parameters.iterations)
+        with torch.autocast("cpu", torch.bfloat16):
+            flows = network(image_0, image_1, parameters.iterations)
         loss = torch.zeros(())
         for flow in flows:
             loss = parameters.decay * loss + (flow - true_flow).abs().mean()
@@ -74,7 +83,7 @@ def train(
         torch.nn.utils.clip_grad_norm_(network.parameters(), parameters.gradient_norm)
         optimizer.step()
         schedule.step()
-        tell(step, float(_end_point_error(flows[-1].detach(), true_flow)))
+        tell(step, float(_end_point_error(flows[-1].detach(), true_flow)), network)
     return network.eval().requires_grad_(False)
 
 

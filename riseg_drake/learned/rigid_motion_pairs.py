@@ -1,7 +1,9 @@
 """Image pairs of bodies that move rigidly over a table, drawn, with the flow that they have: to learn from.
 
 Boxes and ellipsoids with waves, patches or one colour are met by each pixel's ray, so flow is exact. Some of
-them, and some tables, are blank: where nothing can be seen to move, the network must learn from what is around.
+them are blank: where nothing can be seen to move, the network must learn from edges and from what is around.
+The table always has a texture, often a faint one: on a blank one any flow would do, and the pipeline asks for
+none there.
 """
 
 from dataclasses import dataclass
@@ -36,6 +38,10 @@ class PairParameters:
     """... and of its turn about each, rad."""
     color_noise: float = 2.0
     """Standard deviation of gray values, of 255."""
+    blank_bodies: float = 0.15
+    """Share of the bodies that have one colour."""
+    faintest: float = 0.15
+    """Contrast of the faintest texture, as a share of the strongest."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +66,7 @@ def draw_pair(rng: np.random.Generator, parameters: PairParameters) -> FlowPair:
         rng.normal(0, parameters.camera_turn, 3), rng.normal(0, parameters.camera_motion, 3)
     )
     bodies = [_Body(rng, X_WC0, parameters) for _ in range(rng.integers(1, parameters.bodies_max + 1))]
-    paint_table = _Paint(rng, blank_share=0.25)
+    paint_table = _Paint(rng, parameters.faintest)
     light_W = rng.normal([0.0, 0.0, 3.0], 1.0)
     light_W /= np.linalg.norm(light_W)
 
@@ -68,7 +74,7 @@ def draw_pair(rng: np.random.Generator, parameters: PairParameters) -> FlowPair:
         """Colour, depth and the number of the body (0: table)."""
         depth, number, normal_W = _see(intrinsics, X_WC, bodies, poses)
         p_WQ = move_points(X_WC, back_project(depth, intrinsics).astype(float))
-        color = paint_table.color(p_WQ)
+        color: NDArray = paint_table.color(p_WQ)
         for k, (body, X_WB) in enumerate(zip(bodies, poses, strict=True), start=1):
             here = number == k
             color[here] = body.paint.color(move_points(inverse(X_WB), p_WQ[here]))
@@ -90,24 +96,27 @@ def draw_pair(rng: np.random.Generator, parameters: PairParameters) -> FlowPair:
 class _Paint:
     """What colour a body has where; it goes with the body."""
 
-    def __init__(self, rng: np.random.Generator, blank_share: float) -> None:
-        self._base = rng.uniform(40, 255, 3)
-        self._other = rng.uniform(0, 255, 3)
-        self._kind = "blank" if rng.random() < blank_share else rng.choice(["waves", "patches"])
-        if self._kind == "blank" and rng.random() < 0.7:
-            self._base = np.full(3, rng.uniform(180, 250))  # as a table often is
+    def __init__(self, rng: np.random.Generator, faintest: float) -> None:
+        """Draw a texture of any contrast down to `faintest`; 0: one colour."""
+        self._base = rng.uniform(40, 255, 3).astype(np.float32)
+        if rng.random() < 0.3:
+            self._base[:] = rng.uniform(120, 250)  # gray or white, as much is
+        contrast = np.exp(rng.uniform(np.log(faintest), 0)) if faintest else 0.0
+        self._other = self._base + np.float32(contrast) * (
+            rng.uniform(0, 255, 3).astype(np.float32) - self._base
+        )
+        self._steepness = rng.choice([0.4, 4.0])  # waves or patches
         lengths = np.exp(rng.uniform(np.log(0.006), np.log(0.05), 8))
         directions = rng.normal(size=(8, 3))
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-        self._waves = 2 * np.pi * directions / lengths[:, None]
-        self._phases = rng.uniform(0, 2 * np.pi, 8)
+        self._waves = (2 * np.pi * directions / lengths[:, None]).astype(np.float32)
+        self._phases = rng.uniform(0, 2 * np.pi, (8, 1)).astype(np.float32)
 
-    def color(self, p_BQ: NDArray) -> NDArray:
+    def color(self, p_BQ: NDArray) -> NDArray[np.float32]:
         """[..., 3] of points [..., 3]."""
-        if self._kind == "blank":
-            return np.broadcast_to(self._base, p_BQ.shape).copy()
-        height = np.sin(p_BQ @ self._waves.T + self._phases).sum(-1) / np.sqrt(len(self._phases))
-        share = np.clip(0.5 + (0.4 if self._kind == "waves" else 4.0) * height, 0, 1)[..., None]
+        waves = np.sin(self._waves @ p_BQ.reshape(-1, 3).T.astype(np.float32) + self._phases)
+        height = waves.sum(0) / np.sqrt(len(waves))
+        share = np.clip(0.5 + self._steepness * height, 0, 1).reshape(*p_BQ.shape[:-1], 1)
         return self._base + share * (self._other - self._base)
 
 
@@ -117,7 +126,8 @@ class _Body:
     def __init__(self, rng: np.random.Generator, X_WC: NDArray, parameters: PairParameters) -> None:
         self.half_size = rng.uniform([0.012, 0.012, 0.008], [0.05, 0.05, 0.03])
         self.is_box = rng.random() < 0.6
-        self.paint = _Paint(rng, blank_share=0.15)
+        is_blank = rng.random() < parameters.blank_bodies
+        self.paint = _Paint(rng, 0.0 if is_blank else parameters.faintest)
         span = 0.7 * X_WC[2, 3] * parameters.width / parameters.focal_length
         x, y = X_WC[:2, 3] + rng.uniform(-span, span, 2) / 2
         self.X_WB0 = _motion([0, 0, rng.uniform(-np.pi, np.pi)], [x, y, self.half_size[2]])
@@ -129,40 +139,41 @@ class _Body:
         self.X_WB1[:3, 3] = self.X_WB0[:3, 3] + step
 
     def enter(self, eye_B: NDArray, ray_B: NDArray) -> tuple[NDArray, NDArray]:
-        """Depth [N] at which rays [N, 3] enter (inf: never), and the normals [N, 3] there."""
+        """Depth [N] at which rays [3, N] enter (inf: never), and the normals [3, N] there."""
+        half_size, eye_B = self.half_size[:, None], eye_B[:, None]
         with np.errstate(divide="ignore", invalid="ignore"):
             if self.is_box:
-                t = np.stack([(-self.half_size - eye_B) / ray_B, (self.half_size - eye_B) / ray_B])
+                t = np.stack([(-half_size - eye_B) / ray_B, (half_size - eye_B) / ray_B])
                 near, far = t.min(0), t.max(0)
-                axis = near.argmax(-1)
-                depth, last = near.max(-1), far.min(-1)
-                normal = -np.sign(ray_B) * (axis[:, None] == np.arange(3))
-                return np.where(depth < last, depth, np.inf), normal
-            e, r = eye_B / self.half_size, ray_B / self.half_size
-            a, b, c = (r * r).sum(-1), r @ e, e @ e - 1
+                depth = near.max(0)
+                normal = -np.sign(ray_B) * (near == depth)
+                return np.where(depth < far.min(0), depth, np.inf), normal
+            e, r = eye_B / half_size, ray_B / half_size
+            a, b, c = (r * r).sum(0), (r * e).sum(0), (e * e).sum() - 1
             root = np.sqrt(b * b - a * c)  # not a number where the ray misses
             depth = np.nan_to_num((-b - root) / a, nan=np.inf)
-            normal = (eye_B + np.where(np.isfinite(depth), depth, 0)[:, None] * ray_B) / self.half_size**2
-            return depth, normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+            normal = (eye_B + np.where(np.isfinite(depth), depth, 0) * ray_B) / half_size**2
+            return depth, normal / np.linalg.norm(normal, axis=0)
 
 
 def _see(
     intrinsics: Intrinsics, X_WC: NDArray, bodies: list[_Body], poses: list[NDArray]
 ) -> tuple[NDArray, NDArray, NDArray]:
     """Depth [H, W], the body's number [H, W] and the normal in the world [H, W, 3] behind every pixel."""
-    ray_W = (rays(intrinsics).astype(float) @ X_WC[:3, :3].T).reshape(-1, 3)
-    depth = -X_WC[2, 3] / ray_W[:, 2]
+    ray_W = X_WC[:3, :3] @ rays(intrinsics).astype(float).reshape(-1, 3).T  # [3, N]: sums over 3 are fast so
+    depth = -X_WC[2, 3] / ray_W[2]
     number = np.zeros(depth.shape, np.uint16)
-    normal_W = np.broadcast_to([0.0, 0.0, 1.0], ray_W.shape).copy()
+    normal_W = np.tile([[0.0], [0.0], [1.0]], depth.shape)
     for k, (body, X_WB) in enumerate(zip(bodies, poses, strict=True), start=1):
         R_WB = X_WB[:3, :3]
-        enter, normal_B = body.enter((X_WC[:3, 3] - X_WB[:3, 3]) @ R_WB, ray_W @ R_WB)
+        enter, normal_B = body.enter(R_WB.T @ (X_WC[:3, 3] - X_WB[:3, 3]), R_WB.T @ ray_W)
         nearer = enter < depth
-        depth[nearer], number[nearer], normal_W[nearer] = enter[nearer], k, (normal_B @ R_WB.T)[nearer]
+        depth[nearer], number[nearer] = enter[nearer], k
+        normal_W[:, nearer] = R_WB @ normal_B[:, nearer]
     return (
         depth.reshape(intrinsics.shape),
         number.reshape(intrinsics.shape),
-        normal_W.reshape(*intrinsics.shape, 3),
+        normal_W.T.reshape(*intrinsics.shape, 3),
     )
 
 

@@ -88,7 +88,7 @@ class ReferencePieces(Immutable):
     surface: SurfacePixels
     """The witnesses and those on the rim: what leaves its place when it moves."""
     surface_piece: NDArray[np.intp]
-    """Of each of these."""
+    """[K], of each of these."""
     edges: EdgePixels
     """What sharpens the motions."""
     whole_edges: EdgePixels

@@ -1,15 +1,23 @@
 """Sharper outlines in a run, and Segment Anything among the baselines."""
 
 import json
+import threading
 
 import cv2
 import numpy as np
 import pytest
 
-from riseg_drake.app import refinement_block
+from riseg_drake.app import refinement_block, sam_bench
 from riseg_drake.app.cli import main
+from riseg_drake.app.diagram import make_diagram
+from riseg_drake.app.interactions import Progress, interactions
+from riseg_drake.app.scenario import load_scenario
 from riseg_drake.evaluation.scores import score
 from riseg_drake.learned.prompts import Answer
+from riseg_drake.systems.stage_clock import StageClock
+
+LONG = 60.0
+"""s; nothing here waits that long, unless something is broken."""
 
 
 def dilating(color, prompts):
@@ -46,6 +54,43 @@ def test_a_run_leaves_refined_masks_beside_its_own_and_changes_none(small_scenar
         )
     assert (refined > 0).sum() > (mask > 0).sum() > 0
     assert (refined[mask > 0] > 0).all()
+
+
+@pytest.mark.renders
+def test_a_whole_run_goes_on_to_its_end_while_the_model_is_still_at_its_first_mask(
+    small_scenario, tmp_path, monkeypatch
+):
+    begun, may_end = threading.Event(), threading.Event()
+
+    def slow(frame, mask, segmenter, parameters):
+        begun.set()
+        assert may_end.wait(LONG)  # it does not end before the run has
+        return mask
+
+    monkeypatch.setattr(refinement_block, "load_sam", lambda folder, device: dilating)
+    monkeypatch.setattr(refinement_block, "refine_outlines", slow)
+    wired = make_diagram(load_scenario(with_sam(small_scenario, tmp_path, tmp_path / "sam.yaml")), seed=1)
+    contexts, progress, beside = [], Progress(), []
+
+    def follow(frame, context):
+        contexts.append(context)
+        if begun.is_set():
+            beside.append((frame.sequence, wired.mask(context).max(), wired.refined(context)))
+
+    try:
+        steps = list(interactions(wired, StageClock(), progress, 60.0, (follow,)))
+        assert begun.wait(LONG)
+        assert progress.end
+        sequences, ids, refined = zip(*beside, strict=True)
+        assert list(sequences) == list(range(sequences[0], sequences[0] + len(sequences)))  # none was left out
+        assert len(sequences) > 50
+        assert ids[0] == 0 < ids[-1]  # objects were found meanwhile
+        assert set(refined) == {None}
+    finally:
+        may_end.set()  # a worker that waits for ever would keep pytest from ending
+    coming = wired.finish_refinement(contexts[-1])
+    assert [each.time for each in coming] == [step.time for step in steps]
+    np.testing.assert_array_equal(coming[-1].mask, steps[-1].mask)
 
 
 @pytest.mark.renders
@@ -87,3 +132,22 @@ def test_without_a_model_the_evaluation_does_not_begin(tmp_path, capsys, scenari
     assert says in error
     assert error.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.renders
+def test_the_bench_keeps_the_model_at_work_beside_the_frames(small_scenario, tmp_path, monkeypatch, capsys):
+    asked = []
+
+    def model(color, prompts):
+        asked.append(len(prompts))
+        return iter(())
+
+    monkeypatch.setattr(sam_bench, "load_sam", lambda folder, device: model)
+    monkeypatch.setattr(sam_bench, "ROUNDS", 1)
+    assert main(["bench", "--sam", str(with_sam(small_scenario, tmp_path, tmp_path / "sam.yaml"))]) == 0
+    rows = {line.split("  ")[1]: line.split() for line in capsys.readouterr().out.splitlines() if "  " in line}
+    frames = int(rows[sam_bench.ALONE][-3])
+    assert int(rows[sam_bench.BESIDE][-3]) == frames > 10
+    # It answers at once here: an image or two for each frame that it is shown.
+    assert set(asked) == {sam_bench.OBJECTS}
+    assert int(rows[sam_bench.MODEL][-3]) == len(asked) > frames / 4

@@ -14,7 +14,7 @@ QUICK = TrainingParameters(steps=2, batch=1, iterations=2, pairs=PairParameters(
 
 def test_training_repeats_itself_and_its_file_is_loaded_again(tmp_path):
     told = []
-    network = train(0, QUICK, lambda step, error: told.append(step))
+    network = train(0, QUICK, lambda step, *_: told.append(step))
     assert told == [1, 2]
     save(network, tmp_path / "weights" / "raft.pth")
     loaded, again = load_raft(tmp_path / "weights" / "raft.pth"), train(0, QUICK)

@@ -36,6 +36,19 @@ def test_bodies_move_apart_from_the_table():
     assert np.abs(pair.flow[pair.on_body]).max() > 1
 
 
+def test_no_table_is_blank_and_bodies_are_as_often_as_is_asked():
+    def pairs(blank_bodies):
+        quiet = replace(PARAMETERS, color_noise=0.0, bodies_max=1, blank_bodies=blank_bodies)
+        return [draw_pair(np.random.default_rng(seed), quiet) for seed in range(20)]
+
+    def colors_of_bodies(pairs):  # a blank one shows nothing but its shades
+        return np.mean([len(np.unique(p.color_0[p.on_body], axis=0)) for p in pairs])
+
+    all_blank, none_blank = pairs(1.0), pairs(0.0)
+    assert min(p.color_0[~p.on_body].std(0).max() for p in all_blank) > 1.0
+    assert colors_of_bodies(all_blank) < 0.4 * colors_of_bodies(none_blank)
+
+
 def test_the_same_seed_draws_the_same_pair():
     one, two = (draw_pair(np.random.default_rng(5), PARAMETERS) for _ in range(2))
     np.testing.assert_array_equal(one.color_1, two.color_1)
