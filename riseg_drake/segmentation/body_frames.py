@@ -82,7 +82,8 @@ def track_points(
     v, u = pixel
     p_C0Q0 = rays(intrinsics)[v, u] * pair.reference.depth[v, u][..., None].astype(float)
     target = np.stack([u, v], axis=-1) + optical_flow[v, u].astype(float)
-    u_1, v_1 = np.moveaxis(np.rint(target).astype(np.intp), -1, 0)
+    nearest = np.nan_to_num(np.rint(target), nan=-1)  # no flow leads out of the image
+    u_1, v_1 = np.moveaxis(nearest.astype(np.intp), -1, 0)
     inside = (u_1 >= 0) & (v_1 >= 0) & (u_1 < intrinsics.width) & (v_1 < intrinsics.height)
     u_1, v_1 = np.where(inside, u_1, 0), np.where(inside, v_1, 0)
     seen = inside & ~pair.current.robot[v_1, u_1] & (p_C0Q0[..., 2] > 0)

@@ -75,23 +75,36 @@ def refute_motions(
     for k in np.unique(label[label > 0]):
         mine = np.flatnonzero(label[piece] == k)
         own[region] = cv2.dilate(np.append(label == k, False)[pieces.label].astype(np.uint8), _NEXT)
-        pixels = surface.subset(mine)
-        part_of = part[piece[mine]]
+        pixels, part_of = surface.subset(mine), part[piece[mine]]
         for other in _neighbours(label, borders, k):
-            # Where the other motion puts a point, its own part may be by now, from another place.
-            left = seek(pixels, np.linalg.inv(X[k]) @ X[other]).read(own) == 0
-            if np.count_nonzero(left) < pixels_min:
+            left = np.flatnonzero(_left_places(pixels, own, X[k], X[other]))
+            if len(left) < pixels_min:
                 continue
-            sought = seek(pixels.subset(np.flatnonzero(left)), pair.X_C1C0 @ X[other])
-            z_1 = sought.read(pair.current.unhidden_depth)
-            sigma = depth_sigma(sought.depth, float(np.sqrt(2)) * depth_noise)
-            there = np.abs(z_1 - sought.depth) < parameters.sigmas * sigma
-            measured = np.bincount(part_of[left], z_1 > 0, count)
-            share = np.bincount(part_of[left], there & (z_1 > 0), count) / np.maximum(measured, 1)
-            refuted = (measured >= pixels_min) & (share >= parameters.share) & (share > best)
+            measured, there = _found(pair, pixels.subset(left), X[other], depth_noise, parameters.sigmas)
+            of_part = part_of[left]
+            number = np.bincount(of_part, measured, count)
+            share = np.bincount(of_part, there, count) / np.maximum(number, 1)
+            refuted = (number >= pixels_min) & (share >= parameters.share) & (share > best)
             best[refuted] = share[refuted]
             out[refuted[part]] = other
     return out
+
+
+def _left_places(
+    pixels: SurfacePixels, own: NDArray[np.uint8], motion: NDArray, other: NDArray
+) -> NDArray[np.bool_]:
+    """Which pixels [N], moved otherwise, would be where nothing of their own image [H, W] has moved to."""
+    return seek(pixels, np.linalg.inv(motion) @ other).read(own) == 0
+
+
+def _found(
+    pair: FramePair, pixels: SurfacePixels, motion: NDArray, depth_noise: float, sigmas: float
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Where depth was measured at t [N], and where it is that of the pixels moved so [N]."""
+    sought = seek(pixels, pair.X_C1C0 @ motion)
+    z_1 = sought.read(pair.current.unhidden_depth)
+    sigma = depth_sigma(sought.depth, float(np.sqrt(2)) * depth_noise)
+    return z_1 > 0, (z_1 > 0) & (np.abs(z_1 - sought.depth) < sigmas * sigma)
 
 
 def _parts(label: NDArray[np.intp], borders: NDArray[np.intp]) -> tuple[NDArray[np.intp], int]:
