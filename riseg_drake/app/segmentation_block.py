@@ -71,7 +71,9 @@ def add_stages(
     optical = builder.AddSystem(OpticalFlow(flow_method(scenario.optical_flow)))
     motion = builder.AddSystem(CameraMotion(scenario.camera_motion, scenario.bfif.noise))
     grouper = builder.AddSystem(BFIFGrouper(scenario.bfif, seed))
-    propagator = builder.AddSystem(MaskPropagator(view.intrinsics, period, MASK_OFFSET, scenario.segment))
+    propagator = builder.AddSystem(
+        MaskPropagator(view.intrinsics, period, MASK_OFFSET, scenario.segment, scenario.bfif)
+    )
 
     def wire(source: LeafSystem, name: str, *targets: LeafSystem, port: str | None = None) -> None:
         for target in targets:

@@ -15,6 +15,7 @@ from riseg_drake.segmentation.association import (
     KnownObjects,
     associate,
 )
+from riseg_drake.segmentation.bfif import BFIFParameters
 from riseg_drake.segmentation.doubt import DoubtParameters, doubtful_ids
 from riseg_drake.segmentation.effective_flow import effective_flow
 from riseg_drake.segmentation.growth import GrowthParameters, grow_by_similar_flow
@@ -27,11 +28,9 @@ from riseg_drake.segmentation.motion_labels import (
 )
 from riseg_drake.segmentation.motions import (
     BFIFGroups,
-    MotionParameters,
     motion_gaps,
     with_earlier_motions,
 )
-from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.propagation import carry_labels
 
 
@@ -39,8 +38,6 @@ from riseg_drake.segmentation.propagation import carry_labels
 class SegmentParameters:
     """All of line 7."""
 
-    noise: MeasurementNoise = field(default_factory=MeasurementNoise)
-    motions: MotionParameters = field(default_factory=MotionParameters)
     outline: str = field(default="motion", metadata={"choices": ("motion", "flow")})
     """"motion" (which motion explains a pixel, motion_labels.py) or "flow" (breadth first search over
     similar flow, as in the paper, growth.py)."""
@@ -137,6 +134,7 @@ def segment(
     above_0: AboveTable,
     above_1: AboveTable,
     parameters: SegmentParameters,
+    bfif: BFIFParameters,
 ) -> Segmentation:
     """L_t from G_t, O_t and L_t-1.
 
@@ -149,6 +147,7 @@ def segment(
         above_0: objMask at t-1.
         above_1: objMask at t.
         parameters: see there.
+        bfif: what the groups were made with: noise of the measurements, and when two motions are one.
 
     Raises:
         ValueError: for an unknown kind of outline or propagation.
@@ -159,15 +158,11 @@ def segment(
     if groups.flow_span > 0:
         starts = pair.current.time - before.last_motion > parameters.episode_gap
         now = replace(now, last_motion=pair.current.time, episode=now.episode + int(starts))
-    motions = with_earlier_motions(
-        groups, now.motion_of.values(), pair.current.intrinsics.fx, parameters.motions
-    )
+    motions = with_earlier_motions(groups, now.motion_of.values(), pair.current.intrinsics.fx, bfif.motions)
     something_stands = above_0.mask.any()
     if something_stands and (len(motions) or groups.flow_span > 0):
         if parameters.outline == "motion" and now.pieces is None:
-            pieces = cut_pieces(
-                pair.reference, above_0, _moved_as_one(now), parameters.noise, parameters.labels
-            )
+            pieces = cut_pieces(pair.reference, above_0, _moved_as_one(now), bfif.noise, parameters.labels)
             now = replace(now, pieces=pieces)
         if now.pieces is not None:
             motions = align_motions(

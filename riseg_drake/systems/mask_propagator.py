@@ -5,6 +5,7 @@ from pydrake.systems.framework import Context, LeafSystem, State
 
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.segmentation.bfif import BFIFParameters
 from riseg_drake.segmentation.segment import Segmentation, SegmentParameters, nothing_segmented, segment
 from riseg_drake.systems.stage_clock import timed
 
@@ -34,11 +35,15 @@ class MaskPropagator(LeafSystem):
         period: float,
         offset: float,
         parameters: SegmentParameters | None = None,
+        bfif: BFIFParameters | None = None,
     ) -> None:
-        """Update every `period` s, `offset` s after the camera's tick and after the frame pair's."""
+        """Update every `period` s, `offset` s after the camera's tick and after the frame pair's.
+
+        `bfif` is what the groups are made with.
+        """
         super().__init__()
         self.set_name("MaskPropagator")
-        self._parameters = parameters or SegmentParameters()
+        self._parameters, self._bfif = parameters or SegmentParameters(), bfif or BFIFParameters()
         self._pair, *self._stages = (
             self.DeclareAbstractInputPort(name, AbstractValue.Make(object()))
             for name in (
@@ -85,6 +90,6 @@ class MaskPropagator(LeafSystem):
         expected_flow, optical_flow, groups, above_0, above_1 = (s.Eval(context) for s in self._stages)
         before = self._segmentation(context)
         following = segment(
-            before, pair, expected_flow, optical_flow, groups, above_0, above_1, self._parameters
+            before, pair, expected_flow, optical_flow, groups, above_0, above_1, self._parameters, self._bfif
         )
         state.get_mutable_abstract_state(self._state).set_value(following)

@@ -40,7 +40,7 @@ class Algorithm:
         o_t = self.flow(self.pair.reference.color, frame.color)
         rng = np.random.default_rng([0, frame.sequence])
         self.groups = groups or group_body_frames(self.pair, e_t, o_t, above_0, self.bfif, rng)
-        self.inputs = (self.pair, e_t, o_t, self.groups, above_0, above_1, self.segment)
+        self.inputs = (self.pair, e_t, o_t, self.groups, above_0, above_1, self.segment, self.bfif)
         before = self.answer or nothing_segmented(frame.depth.shape)
         self.answer = segment(before, *self.inputs)
         return self.answer

@@ -6,6 +6,7 @@ import pytest
 from riseg_drake.geometry.camera import rays
 from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.segmentation.above_table import AboveTableParameters, objects_above_table
+from riseg_drake.segmentation.bfif import BFIFParameters
 from riseg_drake.segmentation.expected_flow import expected_flow
 from riseg_drake.segmentation.optical_flow import DisFlow
 from riseg_drake.segmentation.segment import SegmentParameters, nothing_segmented, segment
@@ -27,7 +28,7 @@ def labelled(pair: FramePair, label_0: np.ndarray, motions: dict[int, np.ndarray
     o_t = DisFlow()(pair.reference.color, pair.current.color)
     groups = stand_in_groups(label_0, pair.reference.depth, rays(pair.reference.intrinsics), motions)
     start = nothing_segmented(label_0.shape)
-    return segment(start, pair, e_t, o_t, groups, above_0, above_1, SegmentParameters()).mask
+    return segment(start, pair, e_t, o_t, groups, above_0, above_1, SegmentParameters(), BFIFParameters()).mask
 
 
 def best_overlaps(mask: np.ndarray, truth: np.ndarray, bodies: list[int]) -> list[float]:

@@ -6,6 +6,7 @@ from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
 
 from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.segmentation.bfif import BFIFParameters
 from riseg_drake.segmentation.segment import Segmentation, SegmentParameters, nothing_segmented, segment
 from riseg_drake.systems import mask_propagator
 from riseg_drake.systems.mask_propagator import MaskPropagator
@@ -90,6 +91,7 @@ def test_the_mask_is_what_the_function_makes_of_the_inputs(payloads) -> None:
         payloads.above_0,
         payloads.above_1,
         SegmentParameters(),
+        BFIFParameters(),
     )
     np.testing.assert_array_equal(mask, expected.mask)
     assert mask.any()
