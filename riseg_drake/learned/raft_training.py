@@ -22,7 +22,7 @@ from riseg_drake.learned.rigid_motion_pairs import FlowPair, PairParameters, dra
 
 @dataclass
 class TrainingParameters:
-    """Twenty minutes on one core."""
+    """A quarter of an hour on one core."""
 
     steps: int = 8000
     batch: int = 2
