@@ -144,6 +144,7 @@ def test_a_coloured_table_seen_from_beside_with_the_room_around_it_is_the_table(
     assert hit / np.count_nonzero(above.mask) >= 0.8
 
 
+@pytest.mark.renders
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "a fifth"])
 def test_objects_in_rooms_as_data_sets_show_them_are_covered_and_little_else(kind: str) -> None:
     hit = standing = marked = 0
