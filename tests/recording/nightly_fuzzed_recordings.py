@@ -1,4 +1,4 @@
-"""2500 mutated recordings; half an hour. Not collected by default, since its name is no test's:
+"""2500 mutated recordings; a minute or a few. Not collected by default, since its name is no test's:
 
 python -m pytest tests/recording/nightly_fuzzed_recordings.py
 """
