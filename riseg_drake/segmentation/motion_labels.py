@@ -89,6 +89,8 @@ class ReferencePieces(Immutable):
     """The witnesses and those on the rim: what leaves its place when it moves."""
     surface_piece: NDArray[np.intp]
     """[K], of each of these."""
+    left_min: float
+    """Pixels; so many places must have been left before depth can refute a motion."""
     edges: EdgePixels
     """What sharpens the motions."""
     whole_edges: EdgePixels
@@ -143,6 +145,7 @@ def cut_pieces(
         variance=variance[v, u],
         surface=surface,
         surface_piece=whole[tuple(surface.pixel)],
+        left_min=parameters.vacated.area_min * above_0.pixels_per_metre(reference.intrinsics) ** 2,
         edges=edges,
         whole_edges=edges.subset(np.flatnonzero(on_whole)),
     )
@@ -194,6 +197,7 @@ def label_by_motion(
         pieces.surface_piece,
         motions,
         depth_noise,
+        pieces.left_min,
         parameters.vacated,
     )
     out = np.zeros(pair.reference.depth.shape, np.int16)

@@ -74,11 +74,16 @@ def blank_surfaces(pieces: Superpixels, area_min: float) -> NDArray[np.intp]:
     -1 for the pieces of surfaces smaller than `area_min` pixels.
     """
     same = pieces.borders[pieces.contrast < _BLANK]
-    graph = csr_matrix((np.ones(len(same)), (same[:, 0], same[:, 1])), shape=(pieces.count, pieces.count))
-    count, surface = connected_components(graph, directed=False)
+    count, surface = connected_pieces(pieces.count, same)
     area = np.bincount(surface[pieces.label[pieces.label >= 0]], minlength=count)
     number = np.where(area >= area_min, np.cumsum(area >= area_min) - 1, -1)
     return number[surface]
+
+
+def connected_pieces(pieces: int, joined: NDArray[np.intp]) -> tuple[int, NDArray[np.intp]]:
+    """How many parts pieces make where pairs of them [M, 2] are joined, and the part of each [pieces]."""
+    graph = csr_matrix((np.ones(len(joined)), (joined[:, 0], joined[:, 1])), shape=(pieces, pieces))
+    return connected_components(graph, directed=False)
 
 
 def _edges_image(color: NDArray[np.uint8], height: NDArray[np.float32]) -> NDArray[np.uint8]:

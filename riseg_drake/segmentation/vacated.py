@@ -10,13 +10,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import connected_components
 
 from riseg_drake.geometry.camera import Region
 from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.segmentation.noise import depth_sigma
-from riseg_drake.segmentation.superpixels import Superpixels
+from riseg_drake.segmentation.superpixels import Superpixels, connected_pieces
 from riseg_drake.segmentation.surface import SurfacePixels, seek
 
 _NEXT = np.ones((3, 3), np.uint8)
@@ -44,6 +42,7 @@ def refute_motions(
     piece: NDArray[np.intp],
     motions: NDArray[np.float64],
     depth_noise: float,
+    pixels_min: float,
     parameters: VacatedParameters,
 ) -> NDArray[np.intp]:
     """The labels without motions that depth refutes.
@@ -60,15 +59,15 @@ def refute_motions(
         piece: [N], of each of these.
         motions: [G, 4, 4] in C0.
         depth_noise: standard deviation of depth at 1 m, m.
+        pixels_min: what `parameters.area_min` is in pixels.
         parameters: see there.
     """
     if not label.any():
         return label
     borders = pieces.borders
-    part, count = _parts(label, borders)
+    # The connected parts that have one label.
+    count, part = connected_pieces(len(label), borders[label[borders[:, 0]] == label[borders[:, 1]]])
     X = np.concatenate([np.eye(4)[None], motions])
-    focal_length, distance = pair.reference.intrinsics.fx, float(np.median(surface.depth))
-    pixels_min = parameters.area_min * (focal_length / distance) ** 2
     own = np.zeros(pair.reference.depth.shape, np.uint8)
     best = np.zeros(count)
     out = label.copy()
@@ -105,14 +104,6 @@ def _found(
     z_1 = sought.read(pair.current.unhidden_depth)
     sigma = depth_sigma(sought.depth, float(np.sqrt(2)) * depth_noise)
     return z_1 > 0, (z_1 > 0) & (np.abs(z_1 - sought.depth) < sigmas * sigma)
-
-
-def _parts(label: NDArray[np.intp], borders: NDArray[np.intp]) -> tuple[NDArray[np.intp], int]:
-    """The connected part with one label that each piece [N] is of, and how many there are."""
-    same = borders[label[borders[:, 0]] == label[borders[:, 1]]]
-    graph = csr_matrix((np.ones(len(same)), (same[:, 0], same[:, 1])), shape=(len(label),) * 2)
-    count, part = connected_components(graph, directed=False)
-    return part, count
 
 
 def _neighbours(label: NDArray[np.intp], borders: NDArray[np.intp], k: int) -> list[int]:
