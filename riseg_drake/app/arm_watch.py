@@ -8,7 +8,7 @@ from pydrake.systems.framework import Context
 from riseg_drake.app.diagram import WiredDiagram
 from riseg_drake.app.interactions import Progress
 from riseg_drake.app.terminal_operator import TerminalOperator
-from riseg_drake.pushing.push import ArmPhase, Push
+from riseg_drake.pushing.push import NO_PUSH, ArmPhase, Push
 from riseg_drake.robot.supervisor import Cause, Mode
 from riseg_drake.stations.command_process import CommandProcess
 
@@ -28,7 +28,7 @@ class ArmWatch:
         self, wired: WiredDiagram, commands: CommandProcess, operator: TerminalOperator, progress: Progress
     ):
         self._wired, self._commands, self._operator, self._progress = wired, commands, operator, progress
-        self._push: Push | None = None
+        self._push = NO_PUSH
         self._next = 0.0
         self._said = Mode.FOLLOWING
         self._told: dict[Cause, float] = {}
@@ -62,8 +62,8 @@ class ArmWatch:
             self._operator.tell(f"paused: {cause.value}")
 
     def _announce_contact(self, context: Context) -> None:
-        push: Push | None = self._wired.read("active_push", context)
-        if push is self._push or push is None or push.path is None:
+        push: Push = self._wired.read("active_push", context)
+        if push is self._push or push.path is None:
             return
         if self._wired.phase(context) not in (ArmPhase.APPROACH, ArmPhase.PUSH):
             return
