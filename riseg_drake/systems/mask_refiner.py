@@ -64,7 +64,7 @@ class MaskRefiner(LeafSystem):
         pair: FramePair.
         mask: L_t of its current frame [H, W].
         phase: ArmPhase.
-        demand: any value, may be left unconnected; when it changes, the present mask is refined as well.
+        demand: any object, may be left unconnected; when it changes, the present mask is refined as well.
 
     Outputs:
         refined: RefinedMask, the newest; NO_REFINED_MASK before the first.

@@ -21,7 +21,7 @@ class PushPlanner(LeafSystem):
             of the current frame (GetObjsAboveTable).
         mask: L_t of the current frame, [H, W].
         position: the arm's commanded joint angles [7], rad; where the path begins and ends.
-        tried_pushes: sequence of TriedPush; may be left unconnected.
+        tried_pushes: tuple of TriedPush; may be left unconnected.
 
     Outputs:
         push: Push with its path; NO_PUSH when everything is segmented, no valid push exists, or no
