@@ -58,7 +58,7 @@ class WristCamera(LeafSystem):
 
     Inputs `color_image` (ImageRgba8U) and `depth_image` (ImageDepth32F) are evaluated at the pictures'
     times only: at the start, then every `period`, `delay` late. Outputs of the same names and
-    `image_time` (s) are always of one instant; before the first picture the images are black and the
+    `image_time` (s) are always of one instant; before the first picture the images have no pixels and the
     time is -1. The noise depends on the seed and on the number of the picture alone.
     """
 
@@ -69,8 +69,8 @@ class WristCamera(LeafSystem):
         size = (config.width, config.height)
         self._color_in = self.DeclareAbstractInputPort("color_image", Value(ImageRgba8U(*size)))
         self._depth_in = self.DeclareAbstractInputPort("depth_image", Value(ImageDepth32F(*size)))
-        self._color = self.DeclareAbstractState(Value(ImageRgba8U(*size)))
-        self._depth = self.DeclareAbstractState(Value(ImageDepth32F(*size)))
+        self._color = self.DeclareAbstractState(Value(ImageRgba8U()))
+        self._depth = self.DeclareAbstractState(Value(ImageDepth32F()))
         # The time of the picture, and how many pictures were taken before it.
         self._stamp = self.DeclareDiscreteState([-1.0, -1.0])
         self.DeclareStateOutputPort("color_image", self._color)
@@ -88,13 +88,15 @@ class WristCamera(LeafSystem):
         stamp = state.get_mutable_discrete_state(0)
         number = int(stamp[1]) + 1
         rng = np.random.default_rng([self._seed, number])
-        color = state.get_mutable_abstract_state(int(self._color)).get_mutable_value()
-        depth = state.get_mutable_abstract_state(int(self._depth)).get_mutable_value()
+        size = (self._config.width, self._config.height)
+        color, depth = ImageRgba8U(*size), ImageDepth32F(*size)
         seen = self._color_in.Eval(context).data
         color.mutable_data[:] = seen
         color.mutable_data[..., :3], depth.mutable_data[..., 0] = measured_images(
             seen[..., :3], self._depth_in.Eval(context).data[..., 0], self._config, rng
         )
+        state.get_mutable_abstract_state(int(self._color)).set_value(color)
+        state.get_mutable_abstract_state(int(self._depth)).set_value(depth)
         stamp.set_value([context.get_time(), number])
 
 
