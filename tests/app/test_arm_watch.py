@@ -5,7 +5,7 @@ import pytest
 from riseg_drake.app import arm_watch
 from riseg_drake.app.arm_watch import CONTACT_MARGIN, ArmWatch
 from riseg_drake.app.interactions import Progress
-from riseg_drake.pushing.push import ArmPhase
+from riseg_drake.pushing.push import NO_PUSH, ArmPhase
 from riseg_drake.robot.supervisor import Cause, Mode, SafetyState
 
 
@@ -13,7 +13,7 @@ class Desk:
     """A watch with an arm, an operator and a diagram that say what the test wants."""
 
     def __init__(self, monkeypatch, answer=None):
-        self.now, self.answer, self.push, self.doing = 50.0, answer, None, ArmPhase.OBSERVE
+        self.now, self.answer, self.push, self.doing = 50.0, answer, NO_PUSH, ArmPhase.OBSERVE
         self.told, self.contacts, self.releases = [], [], 0
         self.progress = Progress()
         self.report = SimpleNamespace(state=SafetyState(Mode.FOLLOWING), refused="")
