@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pydrake.trajectories import PiecewisePolynomial
 from scipy.interpolate import CubicSpline
 
-from riseg_drake.robot.limits import PANDA_LIMITS, PandaLimits
+from riseg_drake.robot.limits import PANDA_LIMITS, RobotLimits
 
 KNOT_INTERVAL = 0.01
 """Time between the knots of the finished trajectory, s."""
@@ -66,7 +66,7 @@ def rest_to_rest(
     *,
     fractions: NDArray | None = None,
     shortest: float = 0.0,
-    robot: PandaLimits = PANDA_LIMITS,
+    robot: RobotLimits = PANDA_LIMITS,
 ) -> PiecewisePolynomial:
     """The fastest motion through waypoints [N, 7] with a given profile that the limits allow.
 

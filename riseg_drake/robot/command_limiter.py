@@ -24,7 +24,7 @@ from ruckig import (
     Trajectory,
 )
 
-from riseg_drake.robot.limits import PANDA_LIMITS, PandaLimits
+from riseg_drake.robot.limits import PANDA_LIMITS, RobotLimits
 
 _TINY = 1e-3  # rad; no target is taken for one beyond a range for less
 
@@ -52,7 +52,7 @@ class CommandLimits:
         if self.stop_acceleration < self.acceleration or self.stop_jerk < self.jerk:
             raise ValueError("a stop must be allowed at least the acceleration and jerk of other motions")
 
-    def longest_stop(self, robot: PandaLimits = PANDA_LIMITS) -> float:
+    def longest_stop(self, robot: RobotLimits = PANDA_LIMITS) -> float:
         """No stop takes longer than this, s: from full speed, and full acceleration the wrong way."""
         v, a = self.velocity * robot.velocity, self.acceleration * robot.acceleration
         a_stop, j_stop = self.stop_acceleration * robot.acceleration, self.stop_jerk * robot.jerk
@@ -84,7 +84,7 @@ class CommandLimiter:
         position: NDArray,
         period: float = 0.005,
         limits: CommandLimits | None = None,
-        robot: PandaLimits = PANDA_LIMITS,
+        robot: RobotLimits = PANDA_LIMITS,
     ):
         limits = limits or CommandLimits()
         self._period = period

@@ -10,6 +10,8 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, Frame, ModelInstanceIndex
 
+from riseg_drake.robot.limits import ROBOTS, RobotLimits
+
 MODELS_PACKAGE = "riseg_drake_models"
 JOINT_NAMES = tuple(f"panda_joint{i}" for i in range(1, 8))
 
@@ -18,6 +20,9 @@ JOINT_NAMES = tuple(f"panda_joint{i}" for i in range(1, 8))
 class PandaDescription:
     """The arm, and the pusher with its camera. URLs are `package://` or `file://`."""
 
+    robot: str = field(default="panda", metadata={"choices": tuple(ROBOTS)})
+    """Whose limits hold: those of the Panda (Franka Emika Robot) or of the Franka Research 3; their links are of
+    the same lengths, so that one model draws both."""
     arm_url: str = f"package://{MODELS_PACKAGE}/panda/panda.urdf"
     """Or the official description: package://drake_models/franka_description/urdf/panda_arm.urdf."""
     pusher_url: str = f"package://{MODELS_PACKAGE}/pusher/pusher.sdf"
@@ -29,6 +34,11 @@ class PandaDescription:
     X_EC: list[float] = field(default_factory=list)
     """The camera on the tool as calibrated: x, y, z in m, roll, pitch, yaw in rad; empty: as the pusher's
     model has it."""
+
+    @property
+    def limits(self) -> RobotLimits:
+        """What the robot's joints can do."""
+        return ROBOTS[self.robot]
 
 
 @dataclass(frozen=True)
