@@ -4,7 +4,7 @@ All of it is arithmetic on what it is given, time included; the process around i
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +58,7 @@ class ArmStatus:
     """What the arm says."""
 
     time: float
-    """Wall time, s."""
+    """When it was so, s, by the clock of whoever listens."""
     position: NDArray[np.float64]
     """Measured joint angles, rad [7]."""
     velocity: NDArray[np.float64]
@@ -66,10 +66,8 @@ class ArmStatus:
     torque_external: NDArray[np.float64]
     """External torques as the driver gives them, N m [7]; only their size is used."""
     robot_mode: int
-
-    def shifted(self, offset: float) -> "ArmStatus":
-        """The same, said `offset` s later."""
-        return replace(self, time=self.time + offset) if offset else self
+    contradicted: bool = False
+    """Whether others that came with it cannot be of the same arm."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +162,7 @@ class CommandStream:
     ) -> NDArray[np.float64] | None:
         """The command of one period: joint angles or velocities [7] by mode; None while there is none.
 
-        `now` and `image_time`, that of the newest picture, are in s.
+        `now` and `image_time`, that of the newest picture, are in s by the steady clock of the status.
         """
         could_move = self.state.may_move
         target = self._playout.advance(self.period) if could_move else None
@@ -191,6 +189,13 @@ class CommandStream:
                 return np.zeros(7) if self.mode == VELOCITY else None
         return self._command()
 
+    def brake(self) -> NDArray[np.float64] | None:
+        """The command of one period of coming to rest, whatever is known: nothing is looked at any more."""
+        if self._limiter is None:
+            return None
+        self._limiter.stop()
+        return self._command()
+
     def _command(self) -> NDArray[np.float64]:
         assert self._limiter is not None
         return self._limiter.velocity if self.mode == VELOCITY else self._limiter.position
@@ -211,6 +216,7 @@ class CommandStream:
             tip_force=0.0 if status is None else self._tip.force(measured, status.torque_external),
             p_WE=self._tip.position(rest),
             held_back=limiter is not None and limiter.held_back,
+            contradicted=status is not None and status.contradicted,
             lag=0.0 if limiter is None else _largest(measured - (limiter.position - self._drift)),
             gap=0.0
             if limiter is None or target is None

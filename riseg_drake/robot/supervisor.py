@@ -64,6 +64,8 @@ class Cause(Enum):
     FORCE = "something pushes against the arm where no contact was planned"
     NOT_FOLLOWING = "the arm is not where it was told to be"
     GAP = "the motion asked for begins somewhere else"
+    CONTRADICTION = "the arm's status contradicts itself, as if two drivers sent it"
+    FAULT = "the process that sends commands failed"
     INTERRUPT = "Ctrl-C"
     FINISHED = "the program is done"
     CLIENT_GONE = "the program that plans the motion is gone"
@@ -74,7 +76,7 @@ class Observation:
     """All that is looked at, at one moment."""
 
     now: float
-    """Wall time, s."""
+    """By a steady clock, as are the times below, s."""
     status_time: float | None
     """Of the newest status, s; None before the first."""
     robot_mode: int
@@ -94,6 +96,8 @@ class Observation:
     """Largest difference of measured from commanded joint angles, rad; 0 before the first command."""
     gap: float
     """Largest difference of the next target from the last command, rad."""
+    contradicted: bool = False
+    """Whether what comes as the arm's status cannot all be of one arm."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +125,7 @@ def supervise(state: SafetyState, seen: Observation, parameters: SafetyParameter
         return state if worse is Cause.NONE else replace(state, cause=worse)
     if state.mode is Mode.WAITING:
         ready = seen.status_time is not None and seen.robot_mode == MOVE and not _too_old(seen, parameters)
+        ready = ready and not seen.contradicted
         return SafetyState(Mode.FOLLOWING) if ready else state
     danger = _arm_refuses(seen) if _arm_refuses(seen) is not Cause.NONE else _danger(seen, parameters)
     if danger is not Cause.NONE:
@@ -154,6 +159,8 @@ def _arm_refuses(seen: Observation) -> Cause:
 
 def _danger(seen: Observation, parameters: SafetyParameters) -> Cause:
     """What must not go on unless a person has looked at it."""
+    if seen.contradicted:
+        return Cause.CONTRADICTION
     allowed = parameters.push_force if seen.contact_planned else parameters.contact_force
     if seen.tip_force > allowed:
         return Cause.FORCE

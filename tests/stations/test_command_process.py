@@ -12,7 +12,8 @@ from riseg_drake.robot.command_stream import CommandParameters
 from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.supervisor import Cause, Mode
-from riseg_drake.stations.command_process import FINAL_COMMANDS, CommandProcess, command_message
+from riseg_drake.stations.command_process import CommandProcess
+from riseg_drake.stations.command_session import FINAL_COMMANDS, command_message
 from riseg_drake.stations.ideal_arm import IdealArm
 from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm
 
