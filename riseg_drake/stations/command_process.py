@@ -57,7 +57,7 @@ class CommandProcess:
     """
 
     def __init__(self, lcm: LcmConfig, parameters: CommandParameters, panda: PandaDescription):
-        parameters.check()
+        parameters.check(panda.limits)
         spawn = multiprocessing.get_context("spawn")
         self._connection, theirs = spawn.Pipe()
         self._lock = threading.Lock()
@@ -218,7 +218,7 @@ def _begin(
     kinematics = PandaKinematics(panda)
     tip = TipGeometry(lambda q: kinematics.X_WE(q)[:3, 3], kinematics.tip_jacobian)
     network = open_lcm(config)
-    stream = CommandStream(parameters, tip)
+    stream = CommandStream(parameters, tip, panda.limits)
     session = CommandSession(stream, time.monotonic(), config.status_channel, config.image_channel)
     network.Subscribe(config.status_channel, session.hear_status)
     network.Subscribe(config.image_channel, session.hear_picture)

@@ -5,6 +5,7 @@ import pytest
 
 from riseg_drake.robot.command_stream import ArmStatus, CommandParameters, CommandStream, TipGeometry
 from riseg_drake.robot.kinematics import READY
+from riseg_drake.robot.limits import PANDA_LIMITS
 from riseg_drake.robot.paced_commands import PacedCommands
 from riseg_drake.stations.command_session import command_message
 from riseg_drake.stations.panda_driver import MOVE, PandaDriver, PandaDriverConfig
@@ -23,7 +24,7 @@ class Session:
         parameters = CommandParameters(mode=mode)
         parameters.safety.image_age = np.inf
         tip = TipGeometry(lambda q: np.array([0.5, 0.0, 0.2]), lambda q: np.eye(6, 7))
-        self.mode, self.stream = mode, CommandStream(parameters, tip)
+        self.mode, self.stream = mode, CommandStream(parameters, tip, PANDA_LIMITS)
         self.driver = PandaDriver(PandaDriverConfig(control_mode=mode), READY)
         self.paced = PacedCommands(self.stream, STEADY)
         self.now, self.targets = 0.0, 0
