@@ -42,10 +42,12 @@ class CommandParameters:
     playout: PlayoutParameters = field(default_factory=PlayoutParameters)
     safety: SafetyParameters = field(default_factory=SafetyParameters)
 
-    def check(self, robot: RobotLimits) -> None:
-        """Raise ValueError for settings with which a robot could not stop in time."""
+    def check(self, robot: RobotLimits | None = None) -> None:
+        """Raise ValueError for settings that cannot be, or with which a robot could not stop in time."""
         if not 100 <= self.rate <= 1000:
-            raise ValueError(f"rate: {self.rate} commands a second; expected 100 to 1000")
+            raise ValueError(f"rate is {self.rate:g}; expected 100 to 1000 commands a second")
+        if robot is None:
+            return
         longest = self.limits.longest_stop(robot)
         if longest > LONGEST_STOP:
             raise ValueError(

@@ -18,22 +18,35 @@ MOVE, REFLEX, USER_STOPPED = 2, 4, 5
 class SafetyParameters:
     """What makes the arm stop."""
 
-    status_age: float = 0.1
-    """Oldest status in motion and at rest, s."""
-    image_age: float = 0.5
+    status_age: float = field(default=0.1, metadata={"least": 0.02, "most": 0.3})
+    """Oldest status in motion and at rest, s. So long may it move unseen: no longer than a stop may take."""
+    image_age: float = field(default=0.5, metadata={"least": 0.1, "most": 5.0})
     """Oldest picture while the arm moves, s; age counts from the picture's own time stamp."""
-    contact_force: float = 15.0
-    """Largest external force at the tip where no contact is planned, N."""
-    push_force: float = 30.0
+    contact_force: float = field(default=15.0, metadata={"least": 1.0, "most": 100.0})
+    """Largest external force at the tip where no contact is planned, N; above 100 the robot stops by itself."""
+    push_force: float = field(default=30.0, metadata={"least": 1.0, "most": 100.0})
     """Largest external force at the tip during a push, N."""
-    workspace_lower: list[float] = field(default_factory=lambda: [0.15, -0.6, 0.0])
+    workspace_lower: list[float] = field(
+        default_factory=lambda: [0.15, -0.6, 0.0], metadata={"sizes": (3,), "least": -2.0, "most": 2.0}
+    )
     """Least coordinates of the tip in W, m, 3; z = 0 is the table."""
-    workspace_upper: list[float] = field(default_factory=lambda: [0.85, 0.6, 0.9])
-    """Largest coordinates of the tip in W, m, 3."""
-    largest_gap: float = 0.1
+    workspace_upper: list[float] = field(
+        default_factory=lambda: [0.85, 0.6, 0.9], metadata={"sizes": (3,), "least": -2.0, "most": 2.0}
+    )
+    """Largest coordinates of the tip in W, m, 3; no arm reaches as far as 2 m."""
+    largest_gap: float = field(default=0.1, metadata={"least": 0.01, "most": 0.3})
     """The arm may be this far from where it is told to be, and its targets from there, rad."""
-    fresh_for: float = 0.3
+    fresh_for: float = field(default=0.3, metadata={"least": 0.05, "most": 10.0})
     """A pause ends when nothing has been too old for this long, s."""
+
+    def check(self) -> None:
+        """Raise ValueError for bounds that contradict each other."""
+        lower, upper = self.workspace_lower, self.workspace_upper
+        if not all(a < b for a, b in zip(lower, upper, strict=True)):
+            raise ValueError(f"workspace_lower is {lower}; each less than in workspace_upper, {upper} m")
+        if not self.contact_force <= self.push_force:
+            force, most = self.contact_force, self.push_force
+            raise ValueError(f"contact_force is {force:g}; at most push_force, {most:g} N")
 
 
 class Mode(Enum):

@@ -29,10 +29,12 @@ from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.robot.command_stream import CommandParameters
 from riseg_drake.robot.description import PandaDescription, add_panda
+from riseg_drake.robot.limits import check_start_position
 from riseg_drake.stations.arm_messages import AHEAD
 from riseg_drake.stations.lcm_channels import LcmConfig
 from riseg_drake.stations.lcm_images import ImageError, LcmImages, decode_images
 from riseg_drake.stations.lcm_reception import Reception
+from riseg_drake.stations.wrist_camera import check_camera
 
 LONGEST_EXPOSURE = 1.0
 """A picture is sent at most this long after it was taken, s."""
@@ -44,28 +46,34 @@ TARGET_PERIOD = 0.01
 class HardwareCameraConfig:
     """The RealSense camera, as its driver was started."""
 
-    width: int = 640
+    width: int = field(default=640, metadata={"least": 0, "most": 16384})
     """Columns used, from the middle of the picture; 0: all of them. px"""
-    fx: float = 616.285
+    fx: float = field(default=616.285, metadata={"least": 10, "most": 100000.0})
     """Of the whole picture, as the driver calibrates it; px."""
-    fy: float = 615.778
+    fy: float = field(default=615.778, metadata={"least": 10, "most": 100000.0})
     """px"""
     cx: float = 405.418
     """px; a picture of which only the middle is used need not be thought of."""
     cy: float = 232.864
     """px"""
-    full_width: int = 848
+    full_width: int = field(default=848, metadata={"least": 16, "most": 16384})
     """Size of the pictures that the driver sends, px."""
-    full_height: int = 480
+    full_height: int = field(default=480, metadata={"least": 16, "most": 16384})
     """px"""
-    rate: float = 15.0
+    rate: float = field(default=15.0, metadata={"least": 0.5, "most": 120})
     """Pictures looked at in a second, at most; fewer where the computer is busy."""
-    latency: float = 0.0
+    latency: float = field(default=0.0, metadata={"least": 0.0, "most": 1.0})
     """A picture shows where the arm was this long before the picture's stamp, s."""
-    depth_min: float = 0.3
+    depth_min: float = field(default=0.3, metadata={"least": 0.0, "most": 20.0})
     """Nearest depth that is believed, m."""
-    depth_max: float = 3.0
+    depth_max: float = field(default=3.0, metadata={"least": 0.0, "most": 20.0})
     """Farthest depth that is believed, m."""
+
+    def check(self) -> None:
+        """Raise ValueError for a camera that cannot be."""
+        check_camera(self.cx, self.cy, self.full_width, self.full_height, self.depth_min, self.depth_max)
+        if self.width > self.full_width:
+            raise ValueError(f"width is {self.width}; at most full_width, {self.full_width} px")
 
     @property
     def first_column(self) -> int:
@@ -87,12 +95,23 @@ class HardwareStationConfig:
     camera: HardwareCameraConfig = field(default_factory=HardwareCameraConfig)
     lcm: LcmConfig = field(default_factory=LcmConfig)
     command: CommandParameters = field(default_factory=CommandParameters)
-    centre_W: list[float] = field(default_factory=lambda: [0.5, 0.0])
+    centre_W: list[float] = field(
+        default_factory=lambda: [0.5, 0.0], metadata={"sizes": (2,), "least": -1.5, "most": 1.5}
+    )
     """Middle of the work area on the table, x and y in W, m; the camera looks down at it between pushes."""
-    observe_height: float = 0.5
+    observe_height: float = field(default=0.5, metadata={"least": 0.1, "most": 1.5})
     """Height of the camera above it then, m."""
-    start_position: list[float] = field(default_factory=list)
+    start_position: list[float] = field(default_factory=list, metadata={"sizes": (0, 7)})
     """Joint angles to look from instead, rad, 7; empty: as the two lines above say."""
+
+    def check(self) -> None:
+        """Raise ValueError for what this robot cannot do."""
+        limits = self.panda.limits
+        try:
+            self.command.check(limits)
+        except ValueError as error:
+            raise ValueError(f"command.{error}") from None
+        check_start_position(self.start_position, limits, self.command.limits.position_margin)
 
 
 class TargetSink(Protocol):
