@@ -132,6 +132,8 @@ class CommandStream:
         self._contacts: list[tuple[float, float]] = []
         self._status: ArmStatus | None = None
         self.state = SafetyState()
+        self.words = 0
+        """How often the operator has said that the arm may move again."""
 
     @property
     def position(self) -> NDArray[np.float64] | None:
@@ -155,7 +157,7 @@ class CommandStream:
 
     @property
     def off_path(self) -> float:
-        """How far the arm is from its path, rad; from beyond SafetyParameters.off_path that is not gone on with."""
+        """How far the arm is from its path, rad; see SafetyParameters.off_path."""
         return 0.0 if self._status is None else self._playout.distance(self._start(self._status))
 
     def add_target(self, time: float, position: NDArray) -> None:
@@ -180,6 +182,7 @@ class CommandStream:
 
     def release(self) -> None:
         """The operator's word that a stopped arm may move again."""
+        self.words += 1
         self.state = released(self.state)
         if self._limiter is not None:
             self._limiter.held_back = False
