@@ -11,7 +11,7 @@ from pydrake.geometry import Meshcat, StartMeshcat
 from pydrake.systems.framework import Context
 from rich.console import Console
 
-from riseg_drake.app.arm_travel import ARRIVED, straight_motion, travel
+from riseg_drake.app.arm_travel import ARRIVED, WayBack, straight_motion, travel
 from riseg_drake.app.arm_watch import ArmWatch
 from riseg_drake.app.diagram import Drivers, WiredDiagram, make_diagram
 from riseg_drake.app.dry_run import DryRun
@@ -219,11 +219,12 @@ class _Session:
                 CommandProcess(self._config.lcm, self._config.command, self._config.panda)
             )
             self._go_to(q_observe, kinematics, commands)
+            way_back = WayBack(kinematics, q_observe, planned_limits(self._scenario), commands)
             wired = make_diagram(
                 self._scenario,
                 self._seed,
                 self._meshcat,
-                drivers=Drivers(self._reception, commands),
+                drivers=Drivers(self._reception, commands, way_back.take),
                 permit=self._permit,
             )
             listeners: list[Listener] = []
@@ -232,7 +233,8 @@ class _Session:
                     wired, self._scenario, self._seed, self._truth, self._folder.path / RECORDING
                 )
                 listeners.append(stack.enter_context(recording))
-            watch = ArmWatch(wired, commands, self._operator, self._progress)
+            off_path = self._config.command.safety.off_path
+            watch = ArmWatch(wired, commands, self._operator, self._progress, way_back, off_path)
             try:
                 self._interact(wired, lambda context: watch(context) or self._is_silent(PATIENCE), listeners)
             finally:
@@ -328,8 +330,9 @@ class _Session:
         """Whether something from outside has brought the run to its end."""
         for line in self._reception.untold():
             self._operator.tell(line)
-        self._stopped = look(context)
-        return self._stopped
+        was_over = bool(self._progress.end)  # by the operator's word, say
+        self._stopped = look(context) and not was_over
+        return self._stopped or was_over
 
     def _is_silent(self, patience: float) -> bool:
         """Whether the camera has said nothing for `patience`, s."""

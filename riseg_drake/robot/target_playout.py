@@ -25,7 +25,7 @@ class PlayoutParameters:
     slope: float = field(default=2.0, metadata={"least": 0.1, "most": 20.0})
     """The clock's rate changes by at most this much a second, 1/s: from full speed to standstill in 0.5 s."""
     longest: float = field(default=120.0, metadata={"least": 1.0, "most": 3600.0})
-    """Targets are kept for this long at most, s; when the arm is further behind, new ones are refused."""
+    """So much motion may wait at most, s; when the arm is further behind, new targets are refused."""
 
 
 class TargetPlayout:
@@ -34,6 +34,9 @@ class TargetPlayout:
     `time` is what is played out now, s, None before the first target; `rate` how fast it goes, 0 to 1.
     """
 
+    REACH = 1.0
+    """After a stop the path goes on at most this far ahead of where it was left, s: braking takes the arm some
+    tenths ahead, and a path that comes back the way it went must not be cut short."""
     RESERVE = 0.03
     """The clock stands still this long before the last target, s: the motion beyond is not known yet."""
 
@@ -58,17 +61,22 @@ class TargetPlayout:
     def add(self, time: float, position: NDArray) -> None:
         """Take in a target: joint angles [7], rad, for a time, s, later than all before.
 
+        Of a posture that is held the first and the last two are kept: that may take as long as it likes.
+
         Raises ValueError for a time that is not, and where too much is waiting already.
         """
         if self.time is None:
             self.time = time - self._parameters.delay
         elif time <= self._times[-1]:
             raise ValueError(f"a target for {time} s comes after one for {self._times[-1]} s")
-        elif self.remaining > self._parameters.longest:
+        elif self._last_change - self.time > self._parameters.longest:
             raise ValueError(f"targets of more than {self._parameters.longest} s are waiting")
         position = np.asarray(position, np.float64)
         if self._positions and not np.array_equal(position, self._positions[-1]):
             self._last_change = time
+        elif len(self._positions) > 3 and np.array_equal(position, self._positions[-4]):
+            self._times[-2], self._times[-1] = self._times[-1], time
+            return
         self._times.append(time)
         self._positions.append(position)
 
@@ -95,13 +103,21 @@ class TargetPlayout:
         self._positions.clear()
         self._last_change, self.time, self.rate = -np.inf, None, 0.0
 
-    def resume_near(self, position: NDArray, reach: float = 0.5) -> None:
-        """Go on from the point of the path nearest to `position` [7]: where it is, or up to `reach` s ahead."""
-        if self.time is None:
-            return
+    def resume_near(self, position: NDArray) -> None:
+        """Go on from the point of the path nearest to `position` [7]: where it is, or a little ahead."""
+        if self.time is not None:
+            self.time = self._nearest(position)[1]
+
+    def distance(self, position: NDArray) -> float:
+        """How far `position` [7] is from the part of the path where `resume_near` looks, rad; 0 without any."""
+        return 0.0 if self.time is None else self._nearest(position)[0]
+
+    def _nearest(self, position: NDArray) -> tuple[float, float]:
+        """Distance, rad, and time, s, of the nearest point of the next REACH s of the path."""
+        assert self.time is not None
         here = self.time
-        ahead = [time for time in self._times if here < time <= here + reach]
-        self.time = min([here, *ahead], key=lambda t: float(np.abs(self._at(t).position - position).max()))
+        ahead = [time for time in self._times if here < time <= here + self.REACH]
+        return min((float(np.abs(self._at(t).position - position).max()), t) for t in [here, *ahead])
 
     def _forget(self) -> None:
         """Drop what no interpolation needs any more."""

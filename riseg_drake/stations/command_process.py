@@ -27,6 +27,7 @@ from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.robot.supervisor import Cause
 from riseg_drake.stations.command_session import CommandSession, StreamReport, command_message
+from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm
 from riseg_drake.stations.promptness import be_prompt
 
@@ -62,6 +63,8 @@ class CommandProcess:
         self._connection, theirs = spawn.Pipe()
         self._lock = threading.Lock()
         self._report: StreamReport | None = None
+        self.words = 0
+        """How often the operator has said that the arm may move again."""
         self.send_times: NDArray[np.float64] = np.zeros(0)
         """When commands were sent, by a steady clock, s; there once the process has ended."""
         self._process = spawn.Process(
@@ -90,9 +93,19 @@ class CommandProcess:
         """Targets of these times, s, are a push."""
         self._send("contact", start, end)
 
-    def release(self) -> None:
-        """The operator's word that a stopped arm may move again."""
+    def release(self, anew: bool = False) -> None:
+        """The operator's word that a stopped arm may move again: on its path, or `anew` from where it is.
+
+        Then all targets are forgotten, and those to come until `begin_path`.
+        """
+        self.words += 1
+        if anew:
+            self._send("abandon")
         self._send("release")
+
+    def begin_path(self) -> None:
+        """Targets from now on are of a path that begins where the arm is."""
+        self._send("begin")
 
     def done_until(self) -> float:
         """Up to what time, s, targets have been gone through; as of the newest report."""
@@ -175,7 +188,8 @@ def stream_commands(
         signal.signal(end, lambda *_: interrupted.set())
     signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT, signal.SIGTERM))
     try:
-        session, network = _begin(lcm, parameters, panda)
+        clock = EvenClock()
+        session, network = _begin(lcm, parameters, panda, clock())
     except Exception as error:
         with suppress(OSError):
             connection.send(f"{type(error).__name__}: {' '.join(str(error).split())}")
@@ -190,8 +204,9 @@ def stream_commands(
         _obey(connection, session)
         _listen(network, session)
         try:
-            command = session.next(time.monotonic(), time.time())
-            if command is not None and command.is_in_time(time.monotonic()):
+            now = clock()
+            command = session.next(now, now - clock.shift())
+            if command is not None and command.is_in_time(clock()):
                 message = command_message(command.values, parameters.mode, command.stamp)
                 network.Publish(lcm.command_channel, message.encode())
                 session.was_sent(command)
@@ -202,7 +217,7 @@ def stream_commands(
         rounds += 1
         if rounds % REPORT_EVERY == 0:
             _tell(connection, session.report())
-        _wait(session, network)
+        _wait(session, network, clock)
     with suppress(OSError):
         connection.send(session.report())
         connection.send(np.array(sent))
@@ -212,14 +227,14 @@ def stream_commands(
 
 
 def _begin(
-    config: LcmConfig, parameters: CommandParameters, panda: PandaDescription
+    config: LcmConfig, parameters: CommandParameters, panda: PandaDescription, now: float
 ) -> tuple[CommandSession, DrakeLcm]:
     """A session that hears the drivers."""
     kinematics = PandaKinematics(panda)
     tip = TipGeometry(lambda q: kinematics.X_WE(q)[:3, 3], kinematics.tip_jacobian)
     network = open_lcm(config)
     stream = CommandStream(parameters, tip, panda.limits)
-    session = CommandSession(stream, time.monotonic(), config.status_channel, config.image_channel)
+    session = CommandSession(stream, now, config.status_channel, config.image_channel)
     network.Subscribe(config.status_channel, session.hear_status)
     network.Subscribe(config.image_channel, session.hear_picture)
     return session, network
@@ -245,16 +260,16 @@ def _listen(network: DrakeLcm, session: CommandSession) -> None:
         session.fail(error)
 
 
-def _wait(session: CommandSession, network: DrakeLcm) -> None:
+def _wait(session: CommandSession, network: DrakeLcm, clock: EvenClock) -> None:
     """Until the next command is due.
 
     LCM keeps one message of each channel until it is asked: among many that are left out the good ones come
     through if it is asked more often.
     """
-    while session.is_flooded and session.wait(time.monotonic()) > LISTEN_EVERY:
+    while session.is_flooded and session.wait(clock()) > LISTEN_EVERY:
         time.sleep(LISTEN_EVERY)
         _listen(network, session)
-    time.sleep(session.wait(time.monotonic()))
+    time.sleep(session.wait(clock()))
 
 
 def _tell(connection: Connection, report: StreamReport) -> None:

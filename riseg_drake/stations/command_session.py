@@ -25,6 +25,11 @@ MOST_HEARD = 64
 FLOODED_FOR = 1.0
 """After a message that was left out more of the kind are looked for, s."""
 
+DEAF = 0.02
+"""Nobody has listened for a while where two rounds are so far apart, s: LCM keeps one message of a channel."""
+LONGEST_DEAF = 0.4
+"""A driver takes longer than this to start anew, s."""
+
 
 @dataclass(frozen=True)
 class StreamReport:
@@ -39,6 +44,10 @@ class StreamReport:
     done_until: float
     """Targets up to this time have been gone through, s; minus infinity before the first."""
     at_rest: bool
+    off_path: float = 0.0
+    """How far the arm is from its path, rad."""
+    words: int = 0
+    """How many words of the operator this report knows of."""
     refused: str = ""
     """Why targets were not taken, if they were not."""
     failed: str = ""
@@ -61,6 +70,7 @@ class CommandSession:
         self._status: ArmStatus | None = None
         self._image_time: float | None = None
         self._now, self._flooded_until = now, -np.inf
+        self._deaf = self._was_deaf = 0.0  # s, since the last status, and between the one before and that
         self._final = 0
         self._refused = ""
         self.failed = ""
@@ -94,6 +104,10 @@ class CommandSession:
                     self._stream.expect_contact(*values)
                 case "release":
                     self._stream.release()
+                case "abandon":
+                    self._stream.abandon_path()
+                case "begin":
+                    self._stream.begin_path()
                 case "end":
                     self._stream.end(Cause.FINISHED)
                 case _:
@@ -111,7 +125,7 @@ class CommandSession:
         self._stream.end(Cause.FAULT)
 
     def next(self, steady: float, wall: float) -> StampedCommand | None:
-        """One round: the command that is due now, by both clocks, s; None while there is none."""
+        """One round: the command due now, by a steady clock and by that of stamps, s; None while there is none."""
         command = None
         if not self.failed:
             try:
@@ -143,6 +157,8 @@ class CommandSession:
             behind=stream.behind,
             done_until=stream.done_until,
             at_rest=stream.at_rest,
+            off_path=stream.off_path if stream.state.mode is Mode.STOPPED else 0.0,
+            words=stream.words,
             refused=self._refused,
             failed=self.failed,
             left_out={f"{door.channel}: {kind}": n for door in doors for kind, n in door.counts.items()},
@@ -158,19 +174,37 @@ class CommandSession:
 
     def _listen(self, now: float, shift: float) -> None:
         """Let in what has come; `shift` brings a stamp to the clock of `now`, s."""
-        self._now = now
+        pause, self._now = now - self._now, now
+        self._deaf += pause if pause > DEAF else 0.0
+        gap = 0.0
         while self._statuses:
             status = self._status_door.admit(self._statuses.popleft(), now, shift)
             if status is None:
                 self._flooded_until = now + FLOODED_FOR
-            self._status = status or self._status
+            else:
+                gap = max(gap, self._gap_before(status))
+                # What is stamped a little ahead is no younger than what comes now.
+                self._status = replace(status, time=min(status.time, now), gap=gap)
         while self._pictures:
             sent = self._picture_door.admit(self._pictures.popleft(), now, shift)
-            self._image_time = self._image_time if sent is None else sent
+            self._image_time = self._image_time if sent is None else min(sent, now)
         if self._status is not None:
             contradicted = self._status_door.contradicts_itself(now)
             if contradicted is not self._status.contradicted:
                 self._status = replace(self._status, contradicted=contradicted)
+
+    def _gap_before(self, status: ArmStatus) -> float:
+        """How long the arm said nothing before a status, s, as far as somebody listened.
+
+        While this process was kept from running others will have come; but in more than LONGEST_DEAF a driver
+        that has ended can have been started again.
+        """
+        deaf = self._deaf + self._was_deaf
+        self._deaf, self._was_deaf = 0.0, self._deaf
+        if self._status is None:
+            return 0.0
+        gap = status.time - self._status.time
+        return gap - deaf if deaf <= LONGEST_DEAF else gap
 
 
 def command_message(command: NDArray, mode: str, stamp: float) -> lcmt_panda_command:

@@ -38,6 +38,7 @@ class Arm:
         self.commands = []  # None where none was sent
         self.silent_status = False
         self.silent_images = False
+        self.gap = 0.001  # between two statuses, all of which are seen
 
     def step(self):
         command = self.stream.step(self.now, self.status, self.image_time)
@@ -47,11 +48,11 @@ class Arm:
                 command = self.coming[-1] + PERIOD * command
             self.coming.append(command.copy())
         elif command is None:
-            self.coming.append(self.status.position)
+            self.coming.append(self.coming[-1])  # it holds
         position = self.coming.pop(0) if len(self.coming) > 2 else self.coming[0]
         self.now += PERIOD
         if not self.silent_status:
-            self.status = replace(self.status, time=self.now, position=position)
+            self.status = replace(self.status, time=self.now, position=position, gap=self.gap)
         if not self.silent_images:
             self.image_time = self.now - 0.05
         return command
@@ -207,12 +208,13 @@ def test_every_cause_brings_the_arm_to_rest_in_time_and_smoothly(happens, cause,
         assert within_limits(arm.sent())
 
 
-def test_an_old_status_pauses_and_the_motion_goes_on_from_where_it_was():
+def test_a_status_that_comes_late_pauses_and_the_motion_goes_on_from_where_it_was():
     arm = in_motion()
     arm.silent_status = True
     arm.run(1)
     assert arm.stream.state.mode is Mode.PAUSED
-    arm.silent_status = False
+    assert arm.commands[-1] is None
+    arm.silent_status = False  # every one of them comes at last
     arm.run(6)
     np.testing.assert_allclose(arm.sent()[-1], READY + 0.6, atol=1e-6)
     assert within_limits(arm.sent())

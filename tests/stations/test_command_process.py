@@ -44,7 +44,7 @@ def speak_until(arm, condition, patience=30):
 def test_it_holds_the_arm_stops_for_a_reflex_and_ends_when_told():
     config = LcmConfig(url="udpm://239.255.76.67:7671?ttl=0")
     arm = IdealArm(config)
-    with CommandProcess(config, CommandParameters(), PandaDescription()) as commands:
+    with CommandProcess(config, CommandParameters(mode="position"), PandaDescription()) as commands:
         time.sleep(0.05)
         arm.listen()
         assert not arm.commands  # nothing before the arm has spoken

@@ -50,7 +50,7 @@ class Session:
     def cycle(self):
         """One round of the command process."""
         self.plan()
-        status = ArmStatus(STEADY + self.now, self.driver.q_d, self.driver.v_d, np.zeros(7), MOVE)
+        status = ArmStatus(STEADY + self.now, self.driver.q_d, self.driver.v_d, np.zeros(7), MOVE, gap=0.001)
         command = self.paced.next(STEADY + self.now, WALL + self.now, status, STEADY)
         self.let(self.stalls["at work"])
         if command is not None and command.is_in_time(STEADY + self.now):
