@@ -8,7 +8,7 @@ late then, but never off its path, and nothing ever jumps.
 
 from bisect import bisect_right
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +20,12 @@ from riseg_drake.robot.command_limiter import Target
 class PlayoutParameters:
     """How late targets are played out, and how the clock behaves."""
 
-    delay: float = 0.6
+    delay: float = field(default=0.6, metadata={"least": 0.05, "most": 5.0})
     """Targets are played out this long after the time they were meant for, s; silence up to about half of it
     goes unnoticed."""
-    slope: float = 2.0
+    slope: float = field(default=2.0, metadata={"least": 0.1, "most": 20.0})
     """The clock's rate changes by at most this much a second, 1/s: from full speed to standstill in 0.5 s."""
-    longest: float = 120.0
+    longest: float = field(default=120.0, metadata={"least": 1.0, "most": 3600.0})
     """So much motion may wait at most, s; when the arm is further behind, new targets are refused."""
 
 

@@ -7,7 +7,7 @@ from riseg_drake.robot.command_stream import ArmStatus, CommandParameters, Comma
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.limits import PANDA_LIMITS
 from riseg_drake.robot.paced_commands import PacedCommands
-from riseg_drake.stations.command_process import command_message
+from riseg_drake.stations.command_session import command_message
 from riseg_drake.stations.panda_driver import MOVE, PandaDriver, PandaDriverConfig
 
 WALL, STEADY = 1_700_000_000.0, 5000.0  # s, at the beginning
@@ -50,8 +50,8 @@ class Session:
     def cycle(self):
         """One round of the command process."""
         self.plan()
-        status = ArmStatus(WALL + self.now, self.driver.q_d, self.driver.v_d, np.zeros(7), MOVE, gap=0.001)
-        command = self.paced.next(STEADY + self.now, WALL + self.now, status, WALL)
+        status = ArmStatus(STEADY + self.now, self.driver.q_d, self.driver.v_d, np.zeros(7), MOVE, gap=0.001)
+        command = self.paced.next(STEADY + self.now, WALL + self.now, status, STEADY)
         self.let(self.stalls["at work"])
         if command is not None and command.is_in_time(STEADY + self.now):
             self.paced.was_sent(command)
