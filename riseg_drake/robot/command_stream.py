@@ -100,19 +100,19 @@ class TipGeometry:
 class CommandStream:
     """See above. `state` is what the supervisor thinks; `position` what was commanded last, rad [7]."""
 
-    DRIFT_GAIN = 5.0
+    DRIFT_GAIN = 3.0
     """Velocity mode: the arm's drift is taken back with this rate, 1/s ..."""
     DRIFT_SPEED = 0.01
     """... at most this fast, rad/s, ..."""
     SLOW = 0.1
     """... and only while no joint is faster than this, rad/s: in fast motion lag looks like drift."""
-    DRIFT_NOTICED, DRIFT_LEFT = 3e-4, 1e-4
+    DRIFT_NOTICED, DRIFT_LEFT = 3e-4, 5e-5
     """Drift counts from the one on, until less than the other is left, rad: seven joints together are then
-    within a millimetre at the tip, and noise, of which the filter leaves a sixth, moves nothing."""
-    DRIFT_FILTER = 0.1
+    within a millimetre at the tip, and noise, of which the filter leaves a ninth, moves nothing."""
+    DRIFT_FILTER = 0.2
     """Time constant of the filter of measured drift, s."""
-    LAG = 0.01
-    """How long after a command the arm is there, s: half a period, and the driver's low pass of 30 Hz."""
+    LAG = 0.0053
+    """The driver's low pass of 30 Hz keeps the arm so far behind its commands, s."""
 
     def __init__(self, parameters: CommandParameters, tip: TipGeometry, robot: RobotLimits):
         parameters.check(robot)
@@ -327,7 +327,9 @@ class CommandStream:
         if _largest(speed) > self.SLOW:
             self._drift_seen = np.zeros(7)
             return
-        told = self._limiter.position - self._drift - (now - self._status.time + self.LAG) * speed
+        # A velocity holds from its command to the next: half a period on the mean, of the one that has passed.
+        behind = now - self._status.time + self.LAG - self.period / 2
+        told = self._limiter.position - self._drift - behind * speed
         share = self.period / (self.period + self.DRIFT_FILTER)
         was_noticed = self._drift_taken_back
         self._drift_seen = self._drift_seen + share * (told - self._status.position - self._drift_seen)

@@ -6,6 +6,7 @@ their own. Where they run out the clock slows down, smoothly and ahead of time, 
 late then, but never off its path, and nothing ever jumps.
 """
 
+from bisect import bisect_right
 from collections import deque
 from dataclasses import dataclass, field
 
@@ -35,8 +36,8 @@ class TargetPlayout:
     """
 
     REACH = 1.0
-    """After a stop the path goes on at most this far ahead of where it was left, s: braking takes the arm some
-    tenths ahead, and a path that comes back the way it went must not be cut short."""
+    """After a stop the path goes on at most this far from where it was left, s: braking takes the arm some
+    tenths ahead, one whose driver died is as far behind; and a path that comes back is not cut short."""
     RESERVE = 0.03
     """The clock stands still this long before the last target, s: the motion beyond is not known yet."""
 
@@ -71,6 +72,7 @@ class TargetPlayout:
             raise ValueError(f"a target for {time} s comes after one for {self._times[-1]} s")
         elif self._last_change - self.time > self._parameters.longest:
             raise ValueError(f"targets of more than {self._parameters.longest} s are waiting")
+        self._skip_rest()
         position = np.asarray(position, np.float64)
         if self._positions and not np.array_equal(position, self._positions[-1]):
             self._last_change = time
@@ -88,8 +90,7 @@ class TargetPlayout:
         change = self._parameters.slope * period
         self.rate = float(np.clip(min(wanted, 1.0), self.rate - change, self.rate + change))
         self.time = min(self.time + self.rate * period, self._times[-1])
-        if not self.in_motion:  # at rest nothing is lost, or seen, by going to where the clock should be
-            self.time = max(self._last_change, self._times[-1] - self._parameters.delay)
+        self._skip_rest()
         self._forget()
         return self._at(self.time)
 
@@ -104,7 +105,7 @@ class TargetPlayout:
         self._last_change, self.time, self.rate = -np.inf, None, 0.0
 
     def resume_near(self, position: NDArray) -> None:
-        """Go on from the point of the path nearest to `position` [7]: where it is, or a little ahead."""
+        """Go on from the point of the path nearest to `position` [7], a little ahead or behind."""
         if self.time is not None:
             self.time = self._nearest(position)[1]
 
@@ -113,16 +114,24 @@ class TargetPlayout:
         return 0.0 if self.time is None else self._nearest(position)[0]
 
     def _nearest(self, position: NDArray) -> tuple[float, float]:
-        """Distance, rad, and time, s, of the nearest point of the next REACH s of the path."""
+        """Distance, rad, and time, s, of the nearest point of the path within REACH s."""
         assert self.time is not None
-        here = self.time
-        ahead = [time for time in self._times if here < time <= here + self.REACH]
-        return min((float(np.abs(self._at(t).position - position).max()), t) for t in [here, *ahead])
+        near = [k for k, time in enumerate(self._times) if abs(time - self.time) <= self.REACH]
+        times = [self.time, *(self._times[k] for k in near)]
+        positions = np.array([self._at(self.time).position, *(self._positions[k] for k in near)])
+        distances = np.abs(positions - position).max(axis=1)
+        nearest = int(np.argmin(distances))
+        return float(distances[nearest]), times[nearest]
+
+    def _skip_rest(self) -> None:
+        """Where nothing moves go to where the clock should be: nothing is lost by it, or seen."""
+        if self.time is not None and self._times and not self.in_motion:
+            self.time = max(self._last_change, self._times[-1] - self._parameters.delay)
 
     def _forget(self) -> None:
-        """Drop what no interpolation needs any more."""
+        """Drop what neither interpolation nor the way back to the path needs any more."""
         assert self.time is not None
-        while len(self._times) > 3 and self._times[2] < self.time:
+        while len(self._times) > 3 and self._times[2] < self.time - self.REACH:
             self._times.popleft()
             self._positions.popleft()
 
@@ -152,11 +161,9 @@ class TargetPlayout:
         return Target(position, self.rate * velocity, self.rate**2 * acceleration)
 
     def _interval(self, time: float) -> int | None:
-        """k with times[k] <= time < times[k + 1]; None outside. What was forgotten makes k small."""
-        for k in range(len(self._times) - 1):
-            if time < self._times[k + 1]:
-                return k if time >= self._times[k] else None
-        return None
+        """k with times[k] <= time < times[k + 1]; None outside."""
+        k = bisect_right(self._times, time) - 1
+        return k if 0 <= k < len(self._times) - 1 else None
 
     def _derivatives(self, k: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Velocity and acceleration at target k."""

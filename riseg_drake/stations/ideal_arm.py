@@ -26,7 +26,7 @@ def status_message(
 
 
 class IdealArm:
-    """Says what a Panda's driver says, and remembers what it is told. Nothing is checked, delayed or expires."""
+    """Says what a Panda's driver says, and remembers what it is told. Nothing is checked, late or expires."""
 
     def __init__(self, config: LcmConfig):
         self._config = config
