@@ -111,7 +111,7 @@ class CommandSession:
                 case "end":
                     self._stream.end(Cause.FINISHED)
                 case _:
-                    raise RuntimeError(f"{word!r} is not known to the process that sends commands")
+                    self.fail(ValueError(f"{word!r} is not known to the process that sends commands"))
         except Exception as error:
             self.fail(error)
 
