@@ -16,8 +16,10 @@ from pydrake.systems.framework import (
     OutputPort,
     PortDataType,
 )
+from pydrake.trajectories import PiecewisePolynomial
 
 from riseg_drake.app.meshcat_view import MeshcatView
+from riseg_drake.app.planned_speed import push_parameters
 from riseg_drake.app.refinement_block import add_refinement
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.scenario_file import ScenarioError
@@ -42,6 +44,8 @@ class Drivers:
     """What arm and camera say."""
     sink: TargetSink | None = None
     """Who moves the arm; None: nobody."""
+    way_back: Callable[[], PiecewisePolynomial | None] | None = None
+    """Asked again and again for a motion back to where the arm looks from, after it was moved by hand."""
 
 
 class WiredDiagram:
@@ -169,10 +173,11 @@ def make_diagram(
     builder = DiagramBuilder()
     builder.AddSystem(station)
     segmentation = add_segmentation(builder, scenario, kinematics, seed)
-    planner = builder.AddSystem(PushPlanner(kinematics, scenario.push, seed))
+    planner = builder.AddSystem(PushPlanner(kinematics, push_parameters(scenario), seed))
     sink = drivers.sink if drivers else None
     done_until = sink.done_until if sink else None
-    arm = builder.AddSystem(ArmMotion(q_observe, scenario.arm, permit, done_until))
+    way_back = drivers.way_back if drivers else None
+    arm = builder.AddSystem(ArmMotion(q_observe, scenario.arm, permit, done_until, way_back))
 
     for name, port in STATION_PORTS.items():
         builder.Connect(station.GetOutputPort(port), segmentation.inputs[name])

@@ -1,6 +1,5 @@
 """`riseg hand-eye`: is the camera where the scenario says? The arm moves over a scene that stands still."""
 
-import time
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +7,7 @@ from rich.console import Console
 
 from riseg_drake.app.arm_travel import straight_motion, travel
 from riseg_drake.app.hardware import HardwareError, check_limits, listening, wait_for_drivers
+from riseg_drake.app.planned_speed import planned_limits
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.terminal_operator import TerminalOperator
@@ -34,10 +34,11 @@ def hand_eye_command(scenario_file: Path | None, output: Path | None, yes: bool,
     check_limits(scenario)
     kinematics = PandaKinematics(config.panda)
     postures = _postures(kinematics, config)
-    limits = scenario.push.path.limits
+    limits = planned_limits(scenario)
     operator = TerminalOperator(console, yes)
     with listening(config, replayed=False, truth=False) as (reception, _):
-        wait_for_drivers(reception, config)
+        with console.status("waiting for arm and camera") as status:
+            wait_for_drivers(reception, config, ready=True, say=status.update)
         camera = _Collector(reception, config.camera, kinematics)
         with CommandProcess(config.lcm, config.command, config.panda) as commands:
             operator.confirm("the arm goes to where it looks from, and 4 cm around; nothing else may move")
@@ -48,7 +49,7 @@ def hand_eye_command(scenario_file: Path | None, output: Path | None, yes: bool,
                 motion = straight_motion(kinematics, here, q, limits)
                 if index:
                     motion.ScaleTime(1 / SLOWER)
-                travel(commands, motion, camera.look if index else lambda: None)
+                travel(commands, motion, reception.clock, camera.look if index else lambda: None)
                 here = q
     errors = flow_errors(camera.frames)
     if not errors:
@@ -81,7 +82,7 @@ class _Collector:
     def __init__(self, reception: Reception, config: HardwareCameraConfig, kinematics: PandaKinematics):
         self._reception, self._config, self._kinematics = reception, config, kinematics
         self._silhouette = RobotSilhouette(kinematics, config.intrinsics)
-        self._newest = time.time()
+        self._newest = reception.clock()
         self.frames: list[Frame] = []
 
     def look(self) -> None:

@@ -1,5 +1,6 @@
 """Which arm, with which tool: from model files into a MultibodyPlant."""
 
+import math
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
@@ -10,6 +11,8 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, Frame, ModelInstanceIndex
 
+from riseg_drake.robot.limits import ROBOTS, RobotLimits
+
 MODELS_PACKAGE = "riseg_drake_models"
 JOINT_NAMES = tuple(f"panda_joint{i}" for i in range(1, 8))
 
@@ -18,17 +21,32 @@ JOINT_NAMES = tuple(f"panda_joint{i}" for i in range(1, 8))
 class PandaDescription:
     """The arm, and the pusher with its camera. URLs are `package://` or `file://`."""
 
+    robot: str = field(default="panda", metadata={"choices": tuple(ROBOTS)})
+    """Whose limits hold, whatever the model says: the Panda's (Franka Emika Robot) or the Franka Research 3's.
+    Their links are of the same lengths, so that one model draws both."""
     arm_url: str = f"package://{MODELS_PACKAGE}/panda/panda.urdf"
     """Or the official description: package://drake_models/franka_description/urdf/panda_arm.urdf."""
     pusher_url: str = f"package://{MODELS_PACKAGE}/pusher/pusher.sdf"
     """A model with a link `pusher`, to be bolted to the flange, and the frames `tip` and `camera`."""
     drake_models: str = ""
     """Folder of an offline copy of the package drake_models; empty: Drake's own, which it downloads."""
-    tool_yaw: float = 0.0
+    tool_yaw: float = field(default=0.0, metadata={"least": -6.2832, "most": 6.2832})
     """Angle about the flange's z axis from the flange (panda_link8) to the tip frame E, rad."""
-    X_EC: list[float] = field(default_factory=list)
+    X_EC: list[float] = field(default_factory=list, metadata={"sizes": (0, 6)})
     """The camera on the tool as calibrated: x, y, z in m, roll, pitch, yaw in rad; empty: as the pusher's
     model has it."""
+
+    def check(self) -> None:
+        """Raise ValueError for a camera that is nowhere on the tool."""
+        if any(abs(length) > 1 for length in self.X_EC[:3]):
+            raise ValueError(f"X_EC is {self.X_EC}; x, y, z are metres from the tip, at most 1")
+        if any(abs(angle) > 2 * math.pi for angle in self.X_EC[3:]):
+            raise ValueError(f"X_EC is {self.X_EC}; roll, pitch, yaw are radians, at most 2 pi")
+
+    @property
+    def limits(self) -> RobotLimits:
+        """What the robot's joints can do."""
+        return ROBOTS[self.robot]
 
 
 @dataclass(frozen=True)
@@ -79,6 +97,7 @@ def add_panda(plant: MultibodyPlant, description: PandaDescription) -> PandaPart
         plant.GetFrameByName("pusher", pusher),
         RigidTransform(RollPitchYaw(0, 0, description.tool_yaw), np.zeros(3)),
     )
+    _set_limits(plant, arm, description.limits)
     tip_frame = plant.GetFrameByName("tip", pusher)
     camera_frame = plant.GetFrameByName("camera", pusher)
     if description.X_EC:
@@ -89,3 +108,11 @@ def add_panda(plant: MultibodyPlant, description: PandaDescription) -> PandaPart
         X_EC = RigidTransform(RollPitchYaw(description.X_EC[3:]), description.X_EC[:3])
         camera_frame = plant.AddFrame(FixedOffsetFrame("calibrated_camera", tip_frame, X_EC, pusher))
     return PandaParts(arm=arm, pusher=pusher, tip_frame=tip_frame, camera_frame=camera_frame)
+
+
+def _set_limits(plant: MultibodyPlant, arm: ModelInstanceIndex, limits: RobotLimits) -> None:
+    for index, name in enumerate(JOINT_NAMES):
+        joint = plant.GetJointByName(name, arm)
+        joint.set_position_limits([limits.position_lower[index]], [limits.position_upper[index]])
+        joint.set_velocity_limits([-limits.velocity[index]], [limits.velocity[index]])
+        joint.set_acceleration_limits([-limits.acceleration[index]], [limits.acceleration[index]])

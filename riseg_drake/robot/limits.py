@@ -1,5 +1,6 @@
-"""What the Panda's joints can do."""
+"""What the joints of each robot can do."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,24 @@ def _row(*values: float) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, eq=False)
-class PandaLimits:
+class SlowingDown:
+    """How the greatest speed falls towards the end of a joint's range; rows of [7], read-only.
+
+    At a distance d, rad, from the end that it moves towards it is sqrt(2 deceleration d) - offset, rad/s.
+    """
+
+    deceleration: NDArray[np.float64]
+    """rad/s^2"""
+    offset: NDArray[np.float64]
+    """rad/s"""
+
+    def speed(self, distance: NDArray) -> NDArray[np.float64]:
+        """The greatest speed, rad/s, at distances [..., 7], rad, from the end; 0 within some milliradians."""
+        return np.maximum(np.sqrt(2 * self.deceleration * np.maximum(distance, 0)) - self.offset, 0)
+
+
+@dataclass(frozen=True, eq=False)
+class RobotLimits:
     """Limits of the seven joints, each [7] and read-only; rates and torques hold in both directions."""
 
     position_lower: NDArray[np.float64]
@@ -21,13 +39,15 @@ class PandaLimits:
     position_upper: NDArray[np.float64]
     """rad"""
     velocity: NDArray[np.float64]
-    """rad/s"""
+    """rad/s, amid the range."""
     acceleration: NDArray[np.float64]
     """rad/s^2"""
     jerk: NDArray[np.float64]
     """rad/s^3"""
     effort: NDArray[np.float64]
     """N m"""
+    slowing_down: SlowingDown | None = None
+    """Towards the ends of the range; None where speed does not depend on position."""
 
     @property
     def position_middle(self) -> NDArray[np.float64]:
@@ -42,8 +62,30 @@ class PandaLimits:
         """Whether every joint of q [7] keeps `margin` rad to both ends of its range."""
         return bool((self.room(q) >= margin).all())
 
+    def velocity_range(self, q: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Least and greatest velocity, rad/s, each [..., 7], of joints at q [..., 7], rad.
 
-PANDA_LIMITS = PandaLimits(
+        Both are concave in size along each joint: between two positions they are largest in size in between.
+        """
+        shape = np.shape(q)
+        if self.slowing_down is None:
+            return np.broadcast_to(-self.velocity, shape), np.broadcast_to(self.velocity, shape)
+        downwards = self.slowing_down.speed(q - self.position_lower)
+        upwards = self.slowing_down.speed(self.position_upper - q)
+        return -np.minimum(downwards, self.velocity), np.minimum(upwards, self.velocity)
+
+
+def check_start_position(start_position: Sequence[float], limits: RobotLimits, margin: float = 0.0) -> None:
+    """Raise ValueError where joint angles [7], rad, keep no `margin` to the ends; empty ones are none."""
+    for index, q in enumerate(start_position):
+        lower, upper = limits.position_lower[index] + margin, limits.position_upper[index] - margin
+        if not lower <= q <= upper:
+            raise ValueError(
+                f"start_position is {q:g} for joint {index + 1}; expected {lower:g} to {upper:g} rad"
+            )
+
+
+PANDA_LIMITS = RobotLimits(
     position_lower=_row(-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973),
     position_upper=_row(2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973),
     velocity=_row(2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61),
@@ -52,3 +94,20 @@ PANDA_LIMITS = PandaLimits(
     effort=_row(87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0),
 )
 """Franka Control Interface documentation, "Robot and interface specifications", constants for Panda."""
+
+FR3_LIMITS = RobotLimits(
+    position_lower=_row(-2.7501, -1.7918, -2.9065, -3.0481, -2.8101, 0.5409, -3.0196),
+    position_upper=_row(2.7501, 1.7918, 2.9065, -0.1458, 2.8101, 4.5205, 3.0196),
+    velocity=_row(2.62, 2.62, 2.62, 2.62, 5.26, 4.18, 5.26),
+    acceleration=_row(*[10.0] * 7),
+    jerk=_row(*[5000.0] * 7),
+    effort=_row(87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0),
+    slowing_down=SlowingDown(
+        deceleration=_row(6.0, 2.585, 3.5, 4.0, 17.0, 5.5, 17.0),
+        offset=_row(0.30, 0.20, 0.20, 0.30, 0.35, 0.35, 0.35),
+    ),
+)
+"""The same page, constants for Franka Research 3, with its position based velocity limits."""
+
+ROBOTS = {"panda": PANDA_LIMITS, "fr3": FR3_LIMITS}
+"""By the name that a scenario gives a robot (`station.panda.robot`)."""

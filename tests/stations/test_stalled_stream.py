@@ -5,8 +5,9 @@ import pytest
 
 from riseg_drake.robot.command_stream import ArmStatus, CommandParameters, CommandStream, TipGeometry
 from riseg_drake.robot.kinematics import READY
+from riseg_drake.robot.limits import PANDA_LIMITS
 from riseg_drake.robot.paced_commands import PacedCommands
-from riseg_drake.stations.command_process import command_message
+from riseg_drake.stations.command_session import command_message
 from riseg_drake.stations.panda_driver import MOVE, PandaDriver, PandaDriverConfig
 
 WALL, STEADY = 1_700_000_000.0, 5000.0  # s, at the beginning
@@ -23,7 +24,7 @@ class Session:
         parameters = CommandParameters(mode=mode)
         parameters.safety.image_age = np.inf
         tip = TipGeometry(lambda q: np.array([0.5, 0.0, 0.2]), lambda q: np.eye(6, 7))
-        self.mode, self.stream = mode, CommandStream(parameters, tip)
+        self.mode, self.stream = mode, CommandStream(parameters, tip, PANDA_LIMITS)
         self.driver = PandaDriver(PandaDriverConfig(control_mode=mode), READY)
         self.paced = PacedCommands(self.stream, STEADY)
         self.now, self.targets = 0.0, 0
@@ -49,8 +50,8 @@ class Session:
     def cycle(self):
         """One round of the command process."""
         self.plan()
-        status = ArmStatus(WALL + self.now, self.driver.q_d, self.driver.v_d, np.zeros(7), MOVE)
-        command = self.paced.next(STEADY + self.now, WALL + self.now, status, WALL)
+        status = ArmStatus(STEADY + self.now, self.driver.q_d, self.driver.v_d, np.zeros(7), MOVE, gap=0.001)
+        command = self.paced.next(STEADY + self.now, WALL + self.now, status, STEADY)
         self.let(self.stalls["at work"])
         if command is not None and command.is_in_time(STEADY + self.now):
             self.paced.was_sent(command)
