@@ -1,0 +1,150 @@
+"""The emulated driver and the command path in one process, on a clock that the test turns: no LCM, no waiting.
+
+What is real here: PacedCommands and CommandStream as the process of commands calls them, PandaDriver and its
+robot as the emulator does. What is not: the physics (the robot is where it sets itself) and the network (what
+is sent arrives at once, or is lost).
+"""
+
+import numpy as np
+
+from riseg_drake.robot.command_stream import ArmStatus, CommandParameters, CommandStream, TipGeometry
+from riseg_drake.robot.kinematics import READY
+from riseg_drake.robot.limits import PANDA_LIMITS
+from riseg_drake.robot.paced_commands import PacedCommands
+from riseg_drake.stations.command_process import command_message
+from riseg_drake.stations.panda_driver import PandaDriver, PandaDriverConfig
+
+WALL, STEADY = 1_700_000_000.0, 5000.0  # s, at the beginning
+TICK = 1e-3  # s
+
+
+def ideal_tip():
+    """A tip that is always well within the workspace."""
+    return TipGeometry(lambda q: np.array([0.5, 0.0, 0.2]), lambda q: np.eye(6, 7))
+
+
+class DriverAndStream:
+    """A client with its targets, the driver, and the robot.
+
+    `parameters` are the client's (its mode is the driver's, too); `driver` changes fields of PandaDriverConfig.
+    `stalls` keeps the client's process from running for so many seconds, once: "asleep" between two rounds, or
+    "at work" between a command and its sending; `wakes_late` draws the seconds by which a sleep is too long.
+    `lost` is the share of commands that go astray.
+    """
+
+    def __init__(
+        self,
+        mode="velocity",
+        limits=PANDA_LIMITS,
+        q=READY,
+        parameters=None,
+        tip=None,
+        seed=0,
+        lost=0.0,
+        wakes_late=lambda rng: 0.0,
+        **driver,
+    ):
+        self.rng = np.random.default_rng(seed)
+        self.lost, self.wakes_late = lost, wakes_late
+        self.parameters = parameters or CommandParameters()
+        self.parameters.mode = mode
+        self.driver = PandaDriver(PandaDriverConfig(control_mode=mode, **driver), q, limits)
+        self.stream = CommandStream(self.parameters, tip or ideal_tip())
+        self.paced = PacedCommands(self.stream, STEADY)
+        self.now = 0.0
+        self.stalls = {"asleep": 0.0, "at work": 0.0}
+        self.status = None
+        """The newest that the client has heard: old once the driver is gone."""
+        self.shows_pictures = True
+        self._image_time = WALL
+        self.torque_external = np.zeros(7)
+        self.sent = []
+        """(time, s, command) of all that was sent, lost ones included."""
+        self.trace = []
+        """(time, s, robot_mode, q_d, v_d) of every tick."""
+
+    @property
+    def robot(self):
+        return self.driver.robot
+
+    @property
+    def wall(self):
+        """Wall time, s."""
+        return WALL + self.now
+
+    def tick(self):
+        """One millisecond of driver and robot, and what the driver publishes then."""
+        self.now += TICK
+        self.driver.tick(round(1e6 * self.wall))
+        robot, config = self.robot, self.driver.config
+        self.trace.append((self.now, robot.mode, robot.q_d, robot.v_d))
+        if self.shows_pictures:
+            self._image_time = self.wall
+        if self.driver.is_connected:
+            position_error, velocity_error = self.rng.standard_normal((2, 7))
+            self.status = ArmStatus(
+                self.wall,
+                robot.q_d + config.position_noise * position_error,
+                robot.v_d + config.velocity_noise * velocity_error,
+                self.torque_external,
+                robot.mode,
+            )
+
+    def let(self, seconds):
+        """Time passes, without the client."""
+        end = self.now + seconds
+        while self.now + TICK <= end + 1e-9:
+            self.tick()
+        self.now = end
+
+    def cycle(self):
+        """One round of the client's process."""
+        command = self.paced.next(STEADY + self.now, self.wall, self.status, self._image_time)
+        self.let(self.stalls["at work"])
+        if command is not None and command.is_in_time(STEADY + self.now):
+            self.paced.was_sent(command)
+            self.sent.append((self.now, command))
+            if self.rng.random() >= self.lost:
+                self.driver.receive(command_message(command.values, self.parameters.mode, command.stamp))
+        late = self.wakes_late(self.rng)
+        self.let(self.paced.wait(STEADY + self.now) + self.stalls["asleep"] + late)
+        self.stalls = dict.fromkeys(self.stalls, 0.0)
+
+    def run(self, seconds):
+        """Both go on."""
+        end = self.now + seconds
+        while self.now < end - 1e-9:
+            self.cycle()
+        return self
+
+    def plan(self, path, begin=None):
+        """Send the targets of a trajectory (`value(t)` [7, 1], `end_time()`), every 10 ms, from `begin`, s.
+
+        `begin` is a wall time (now). Targets go on for a second at its end, as the product's do.
+        """
+        begin = self.wall if begin is None else begin
+        for t in np.arange(0, path.end_time() + 1, 0.01):
+            self.stream.add_target(begin + t, path.value(min(t, path.end_time()))[:, 0])
+
+    def restart(self):
+        """Somebody sees to it that the robot is not stopped, and starts the driver; wait until it speaks."""
+        self.robot.recover()
+        self.driver.start(round(1e6 * self.wall))
+        while not self.driver.is_connected:
+            self.cycle()
+        return self
+
+    def guide(self, joint, angle):
+        """Somebody turns a joint, 0 to 6, by an angle, rad, and lets go."""
+        goal = self.robot.q_d.copy()
+        goal[joint] += angle
+        self.robot.guide(goal)
+        return self.run(2 + abs(angle) / 0.2)
+
+    def fastest(self, since):
+        """Largest speed of a joint since a time, s; rad/s."""
+        return max(np.abs(v_d).max() for time, _, _, v_d in self.trace if time >= since)
+
+    def sent_since(self, since):
+        """Commands since a time, s."""
+        return [command for time, command in self.sent if time >= since]
