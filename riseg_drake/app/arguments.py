@@ -135,7 +135,7 @@ def command_line() -> argparse.ArgumentParser:
     emulate.add_argument(
         "--control-mode",
         choices=("status_only", "velocity", "position"),
-        help="the arm driver's flag (as the scenario says: position)",
+        help="the arm driver's flag (as the scenario says: velocity)",
     )
     emulate.add_argument(
         "--fault",

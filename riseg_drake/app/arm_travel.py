@@ -36,7 +36,7 @@ def straight_motion(
             "the straight way to the observation posture comes too near to the table or to the arm itself; "
             "guide the arm by hand to nearer to it, tool down and well above the objects"
         )
-    return rest_to_rest(way, minimum_jerk, limits)
+    return rest_to_rest(way, minimum_jerk, limits, kinematics.limits)
 
 
 def travel(

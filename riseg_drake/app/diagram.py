@@ -18,6 +18,7 @@ from pydrake.systems.framework import (
 )
 
 from riseg_drake.app.meshcat_view import MeshcatView
+from riseg_drake.app.planned_speed import push_parameters
 from riseg_drake.app.refinement_block import add_refinement
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.scenario_file import ScenarioError
@@ -169,7 +170,7 @@ def make_diagram(
     builder = DiagramBuilder()
     builder.AddSystem(station)
     segmentation = add_segmentation(builder, scenario, kinematics, seed)
-    planner = builder.AddSystem(PushPlanner(kinematics, scenario.push, seed))
+    planner = builder.AddSystem(PushPlanner(kinematics, push_parameters(scenario), seed))
     sink = drivers.sink if drivers else None
     done_until = sink.done_until if sink else None
     arm = builder.AddSystem(ArmMotion(q_observe, scenario.arm, permit, done_until))

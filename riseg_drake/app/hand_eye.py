@@ -8,6 +8,7 @@ from rich.console import Console
 
 from riseg_drake.app.arm_travel import straight_motion, travel
 from riseg_drake.app.hardware import HardwareError, check_limits, listening, wait_for_drivers
+from riseg_drake.app.planned_speed import planned_limits
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.terminal_operator import TerminalOperator
@@ -34,7 +35,7 @@ def hand_eye_command(scenario_file: Path | None, output: Path | None, yes: bool,
     check_limits(scenario)
     kinematics = PandaKinematics(config.panda)
     postures = _postures(kinematics, config)
-    limits = scenario.push.path.limits
+    limits = planned_limits(scenario)
     operator = TerminalOperator(console, yes)
     with listening(config, replayed=False, truth=False) as (reception, _):
         wait_for_drivers(reception, config)

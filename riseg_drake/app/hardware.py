@@ -16,6 +16,7 @@ from riseg_drake.app.diagram import Drivers, WiredDiagram, make_diagram
 from riseg_drake.app.dry_run import DryRun
 from riseg_drake.app.interactions import Listener, Progress, TruthSource, WallClock, interactions
 from riseg_drake.app.output import RECORDING, RunFolder, Step
+from riseg_drake.app.planned_speed import planned_limits
 from riseg_drake.app.run import Narrator, report, state_of
 from riseg_drake.app.run_recording import recording_of
 from riseg_drake.app.scenario import HARDWARE, Scenario, load_scenario, scenario_name
@@ -81,11 +82,12 @@ def check_limits(scenario: Scenario) -> None:
     """Raise ScenarioError unless the arm can stop in time, and paths are slower than what it may be sent."""
     command = scenario.hardware.command
     try:
-        command.check()
+        command.check(scenario.hardware.panda.limits)
     except ValueError as error:
         raise ScenarioError(f"station.command: {error}") from None
+    limits = planned_limits(scenario)
     for name in ("velocity", "acceleration", "jerk"):
-        planned, allowed = getattr(scenario.push.path.limits, name), getattr(command.limits, name)
+        planned, allowed = getattr(limits, name), getattr(command.limits, name)
         if planned > allowed:
             raise ScenarioError(
                 f"push.path.limits.{name} is {planned}, more than the {allowed} that "
@@ -243,7 +245,7 @@ class _Session:
         here = self._reception.status.position
         if np.abs(here - q).max() < ARRIVED / 2:
             return
-        motion = straight_motion(kinematics, here, q, self._scenario.push.path.limits)
+        motion = straight_motion(kinematics, here, q, planned_limits(self._scenario))
         turn = np.degrees(np.abs(q - here).max())
         self._operator.confirm(
             f"the arm goes to where it looks from, {turn:.0f} degrees in {motion.end_time():.1f} s"

@@ -14,7 +14,7 @@ from rich.table import Table
 from riseg_drake.robot.command_stream import CommandParameters
 from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import READY
-from riseg_drake.robot.limits import PANDA_LIMITS
+from riseg_drake.robot.limits import RobotLimits
 from riseg_drake.robot.target_playout import PlayoutParameters
 from riseg_drake.stations.command_process import CommandProcess
 from riseg_drake.stations.hardware import TARGET_PERIOD
@@ -87,18 +87,21 @@ def bench_stops(console: Console) -> None:
 
 def measure_stop(happen: Callable[[_World], None], patience: float) -> Stop:
     """Let an arm swing, let something happen, and watch the commands; `patience` s pass before it counts."""
-    config, parameters = LcmConfig(url=URL), CommandParameters()
-    with CommandProcess(config, parameters, PandaDescription()) as commands:
+    config, parameters, panda = LcmConfig(url=URL), CommandParameters(), PandaDescription()
+    with CommandProcess(config, parameters, panda) as commands:
         world = _World(IdealArm(config), commands, time.time())
         _live(world, BEFORE)
         cause = time.time()
         happen(world)
         _live(world, AFTER + patience)
-    return judged(world.arm.commands, cause + patience, parameters)
+    return judged(world.arm.commands, cause + patience, parameters, panda.limits)
 
 
 def judged(
-    commands: list[tuple[float, NDArray[np.float64]]], cause: float, parameters: CommandParameters
+    commands: list[tuple[float, NDArray[np.float64]]],
+    cause: float,
+    parameters: CommandParameters,
+    robot: RobotLimits,
 ) -> Stop:
     """The stop in a list of commands (stamp in s, joint angles in rad [7]), for a cause at a wall time, s.
 
@@ -113,7 +116,7 @@ def judged(
         raise RuntimeError("the arm did not move before it was to stop")
     # A velocity is that of the middle of its step.
     acceleration = 2 * np.abs(np.diff(velocity, axis=0)) / (steps[1:] + steps[:-1])
-    allowed = parameters.limits.stop_acceleration * PANDA_LIMITS.acceleration
+    allowed = parameters.limits.stop_acceleration * robot.acceleration
     return Stop(max(float(moving[-1]) - cause, 0.0), float((acceleration / allowed).max()))
 
 

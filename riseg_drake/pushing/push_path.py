@@ -21,7 +21,30 @@ from riseg_drake.robot.kinematics import (
     pose_error,
     tip_pointing_down,
 )
-from riseg_drake.robot.limits import PANDA_LIMITS
+from riseg_drake.robot.limits import RobotLimits
+
+LONGEST = 9.0
+"""A path that takes longer than this, s, at the usual speed is no path: the arm has to wind itself around."""
+
+
+@dataclass
+class PlannedSpeed:
+    """Shares of the robot's limits that planned motions use. What is left out follows from the station:
+    from what its commands may use on a real robot, and SpeedLimits in simulation.
+    """
+
+    velocity: float | None = None
+    acceleration: float | None = None
+    jerk: float | None = None
+
+    def limits(self, otherwise: SpeedLimits | None = None) -> SpeedLimits:
+        """With `otherwise` (SpeedLimits() if None) where nothing is said."""
+        otherwise = otherwise or SpeedLimits()
+        return SpeedLimits(
+            otherwise.velocity if self.velocity is None else self.velocity,
+            otherwise.acceleration if self.acceleration is None else self.acceleration,
+            otherwise.jerk if self.jerk is None else self.jerk,
+        )
 
 
 @dataclass
@@ -34,12 +57,13 @@ class PushPathParameters:
     """The tip gathers and loses that speed in this time, s."""
     crossing_height: float = 0.02
     """Room below the tip when it crosses above the tallest object, m."""
-    longest: float = 9.0
-    """A path that would take longer than this, s, is no path: the arm has to wind itself around."""
+    longest: float | None = None
+    """A path that would take longer than this, s, is no path; None: LONGEST, and longer by as much as `limits`
+    are lower than usual."""
     arm_room: float = 0.05
     """Objects must stay this much below the flange while the tip is down, m."""
-    limits: SpeedLimits = field(default_factory=SpeedLimits)
-    """Shares of the joints' limits that are used."""
+    limits: PlannedSpeed = field(default_factory=PlannedSpeed)
+    """How fast."""
     position_step: float = 0.015
     """Distance between poses at which the joint angles are solved for, m ..."""
     angle_step: float = 0.08
@@ -113,8 +137,10 @@ def plan_push_path(
     legs = _crossing(q_observe, climb[-1], crossing, kinematics, parameters)
     if legs is None:
         return None
-    path = _in_time([*legs, climb[::-1], stroke], push.length, parameters)
-    return path if path.duration <= parameters.longest else None
+    limits = parameters.limits.limits()
+    path = _in_time([*legs, climb[::-1], stroke], push.length, limits, kinematics.limits, parameters)
+    longest = LONGEST * max(limits.slowness, 1.0) if parameters.longest is None else parameters.longest
+    return path if path.duration <= longest else None
 
 
 def _crossing(
@@ -187,7 +213,7 @@ def _lead(
         if (
             q is None
             or np.abs(q - led[-1]).max() > parameters.joint_step
-            or not PANDA_LIMITS.contains(q, LIMIT_MARGIN)
+            or not kinematics.limits.contains(q, LIMIT_MARGIN)
             or kinematics.clearance(q) < parameters.min_clearance
         ):
             return None
@@ -213,17 +239,20 @@ def _tip(kinematics: PandaKinematics, q: NDArray) -> tuple[NDArray[np.float64], 
     return X_WE[:3, 3], float(np.arctan2(X_WE[1, 0], X_WE[0, 0]))
 
 
-def _in_time(legs: list[NDArray], length: float, parameters: PushPathParameters) -> PushPath:
+def _in_time(
+    legs: list[NDArray], length: float, limits: SpeedLimits, robot: RobotLimits, parameters: PushPathParameters
+) -> PushPath:
     """Time laws for legs of joint angles, of which the last is the push, and for the way back."""
     stroke_time = length / parameters.push_speed + parameters.ramp_time
-    there = [rest_to_rest(leg, minimum_jerk, parameters.limits) for leg in legs[:-1]]
+    there = [rest_to_rest(leg, minimum_jerk, limits, robot) for leg in legs[:-1]]
     stroke = rest_to_rest(
         legs[-1],
         steady_speed(parameters.ramp_time / stroke_time),
-        parameters.limits,
+        limits,
+        robot,
         shortest=stroke_time,
     )
-    back = [rest_to_rest(leg[::-1], minimum_jerk, parameters.limits) for leg in reversed(legs)]
+    back = [rest_to_rest(leg[::-1], minimum_jerk, limits, robot) for leg in reversed(legs)]
     breaks = [0.0]
     trajectory: PiecewisePolynomial | None = None
     for piece in [*there, stroke, *back]:

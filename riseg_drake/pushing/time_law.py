@@ -8,10 +8,12 @@ from numpy.typing import NDArray
 from pydrake.trajectories import PiecewisePolynomial
 from scipy.interpolate import CubicSpline
 
-from riseg_drake.robot.limits import PANDA_LIMITS, RobotLimits
+from riseg_drake.robot.limits import RobotLimits
 
 KNOT_INTERVAL = 0.01
 """Time between the knots of the finished trajectory, s."""
+
+_SLOWEST = 1e-3  # rad/s; at the very end of a range no speed is left, and a motion still has to end
 
 Profile = Callable[[NDArray], NDArray]
 """tau [N] in [0, 1] -> s, s', s'', s''' [4, N]: how much of the path is done, and its derivatives."""
@@ -19,11 +21,21 @@ Profile = Callable[[NDArray], NDArray]
 
 @dataclass
 class SpeedLimits:
-    """Shares of the published limits of the joints that a motion may use."""
+    """Shares of the robot's limits that a motion may use; as they stand here in simulation."""
 
     velocity: float = 0.6
     acceleration: float = 0.5
     jerk: float = 0.25
+
+    @property
+    def slowness(self) -> float:
+        """How much longer a motion takes at most than with the shares that stand here."""
+        usual = SpeedLimits()
+        return max(
+            usual.velocity / self.velocity,
+            (usual.acceleration / self.acceleration) ** (1 / 2),
+            (usual.jerk / self.jerk) ** (1 / 3),
+        )
 
 
 def minimum_jerk(tau: NDArray) -> NDArray[np.float64]:
@@ -63,10 +75,10 @@ def rest_to_rest(
     waypoints: NDArray,
     profile: Profile,
     limits: SpeedLimits,
+    robot: RobotLimits,
     *,
     fractions: NDArray | None = None,
     shortest: float = 0.0,
-    robot: RobotLimits = PANDA_LIMITS,
 ) -> PiecewisePolynomial:
     """The fastest motion through waypoints [N, 7] with a given profile that the limits allow.
 
@@ -77,9 +89,9 @@ def rest_to_rest(
         waypoints: [N, 7], N >= 2, joint angles, rad.
         profile: how the path is gone through.
         limits: shares of the robot's limits.
+        robot: what its joints can do, at each position of the path.
         fractions: [N], share of the path at which each waypoint lies, evenly spaced if None.
         shortest: least duration, s.
-        robot: its published limits.
 
     Returns:
         A trajectory from time 0, at rest at both ends, with continuous acceleration.
@@ -90,8 +102,10 @@ def rest_to_rest(
     path = CubicSpline(fractions, waypoints)
     tau = np.linspace(0, 1, 201)
     s, ds, dds, ddds = profile(tau)[..., None]
-    q_1, q_2, q_3 = (path(s[:, 0], order) for order in (1, 2, 3))
-    velocity = np.abs(q_1 * ds) / (limits.velocity * robot.velocity)
+    q_0, q_1, q_2, q_3 = (path(s[:, 0], order) for order in range(4))
+    lowest, highest = robot.velocity_range(q_0)
+    towards = np.maximum(np.where(q_1 * ds > 0, highest, -lowest), _SLOWEST)
+    velocity = np.abs(q_1 * ds) / (limits.velocity * towards)
     acceleration = np.abs(q_2 * ds**2 + q_1 * dds) / (limits.acceleration * robot.acceleration)
     jerk = np.abs(q_3 * ds**3 + 3 * q_2 * ds * dds + q_1 * ddds) / (limits.jerk * robot.jerk)
     duration = max(velocity.max(), acceleration.max() ** 0.5, jerk.max() ** (1 / 3), shortest)

@@ -6,8 +6,9 @@ which is how the arm judges them, are means of the trajectory's and keep its lim
 
 A wish near to where the trajectory is, such as the next point of a planned path, is followed by a linear
 law, which does not chatter; Ruckig, fastest within limits, brings the trajectory there from anywhere else.
-A step is only taken if the arm can come to rest after it within the joints' ranges: that stop is kept
-ready, and is all that happens when there is nothing to follow, or nothing that may be.
+A step is only taken if the arm can come to rest after it within the joints' ranges, and on the way there is
+nowhere faster than it may be at that position: that stop is kept ready, and is all that happens when there
+is nothing to follow, or nothing that may be.
 """
 
 from dataclasses import dataclass
@@ -24,16 +25,18 @@ from ruckig import (
     Trajectory,
 )
 
-from riseg_drake.robot.limits import PANDA_LIMITS, RobotLimits
+from riseg_drake.robot.limits import RobotLimits
 
 _TINY = 1e-3  # rad; no target is taken for one beyond a range for less
+_CREEP = 1e-3  # rad/s; Ruckig wants some speed, also where a joint has none towards the end of its range
+_LOOKS = 10  # at the speeds of a stop
 
 
 @dataclass
 class CommandLimits:
-    """Shares of the published limits of the joints that commands may use, more than 0 and at most 1."""
+    """Shares of the robot's limits that commands may use, more than 0 and at most 1."""
 
-    velocity: float = 0.4
+    velocity: float = 0.35
     acceleration: float = 0.4
     jerk: float = 0.25
     stop_acceleration: float = 0.8
@@ -52,7 +55,7 @@ class CommandLimits:
         if self.stop_acceleration < self.acceleration or self.stop_jerk < self.jerk:
             raise ValueError("a stop must be allowed at least the acceleration and jerk of other motions")
 
-    def longest_stop(self, robot: RobotLimits = PANDA_LIMITS) -> float:
+    def longest_stop(self, robot: RobotLimits) -> float:
         """No stop takes longer than this, s: from full speed, and full acceleration the wrong way."""
         v, a = self.velocity * robot.velocity, self.acceleration * robot.acceleration
         a_stop, j_stop = self.stop_acceleration * robot.acceleration, self.stop_jerk * robot.jerk
@@ -82,20 +85,20 @@ class CommandLimiter:
     def __init__(
         self,
         position: NDArray,
+        robot: RobotLimits,
         period: float = 0.005,
         limits: CommandLimits | None = None,
-        robot: RobotLimits = PANDA_LIMITS,
     ):
         limits = limits or CommandLimits()
+        self._robot = robot
         self._period = period
-        self._velocity_limit = limits.velocity * robot.velocity
+        self._velocity_share = limits.velocity
         self._acceleration_limit = limits.acceleration * robot.acceleration
         self._jerk_limit = limits.jerk * robot.jerk
         self._lower = robot.position_lower + limits.position_margin
         self._upper = robot.position_upper - limits.position_margin
         self._otg = Ruckig(7, period)
         self._way = InputParameter(7)
-        self._way.max_velocity = list(self._velocity_limit)
         self._way.max_acceleration = list(self._acceleration_limit)
         self._way.max_jerk = list(self._jerk_limit)
         self._braking = InputParameter(7)
@@ -129,13 +132,13 @@ class CommandLimiter:
         """Advance by one period towards a target; returns the command, rad [7]."""
         target, leads_out = self._within_ranges(target)
         candidate = self._follow_linearly(target) or self._approach(target)
-        if candidate is not None:
-            stop = self._stop_from(*candidate)
-            if self._keeps_to_ranges(stop):
-                self.position, self.velocity, self.acceleration = candidate
-                self._stop, self._stopped_for, self.held_back = stop, 0.0, leads_out
-                return self.position
-        self.held_back = True
+        stop = None if candidate is None else self._stop_from(*candidate)
+        if candidate is None or stop is None or not self._ends_in_ranges(stop):
+            self.held_back = True
+        elif self._is_slow_enough(stop):
+            self.position, self.velocity, self.acceleration = candidate
+            self._stop, self._stopped_for, self.held_back = stop, 0.0, leads_out
+            return self.position
         return self.stop()
 
     def stop(self) -> NDArray[np.float64]:
@@ -149,6 +152,11 @@ class CommandLimiter:
                 np.array, self._stop.at_time(self._stopped_for)[:3]
             )
         return self.position
+
+    def _velocity_range(self, position: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Least and greatest velocity, rad/s, each [..., 7], at `position` [..., 7], rad."""
+        lowest, highest = self._robot.velocity_range(position)
+        return self._velocity_share * lowest, self._velocity_share * highest
 
     def _within_ranges(self, target: Target) -> tuple[Target, bool]:
         """The nearest target in the joints' ranges, still in the joints that had to be moved; whether any had.
@@ -174,25 +182,31 @@ class CommandLimiter:
         )
         acceleration = self.acceleration + T * jerk
         velocity = free_velocity + T**2 / 2 * jerk
+        position = free_position + T**3 / 6 * jerk
+        lowest, highest = self._velocity_range(position)
         # The speed that is still gathered while the acceleration is taken back.
         coming = velocity + acceleration * np.abs(acceleration) / (2 * self._jerk_limit)
         if (
             (np.abs(jerk) > self._jerk_limit).any()
             or (np.abs(acceleration) > self._acceleration_limit).any()
-            or (np.abs(velocity) > self._velocity_limit).any()
-            or (np.abs(coming) > self._velocity_limit).any()
+            or (np.minimum(velocity, coming) < lowest).any()
+            or (np.maximum(velocity, coming) > highest).any()
         ):
             return None
-        return free_position + T**3 / 6 * jerk, velocity, acceleration
+        return position, velocity, acceleration
 
     def _approach(self, target: Target) -> tuple[NDArray, NDArray, NDArray] | None:
         """The state after one period of Ruckig's fastest way to the target, None where it finds none."""
-        room = 0.999 * self._velocity_limit  # Ruckig wants a target that could be left again
+        # Between here and there a joint may be at least as fast as at the slower of both ends.
+        lowest, highest = self._velocity_range(np.stack([self.position, target.position]))
+        lowest, highest = np.minimum(lowest.max(axis=0), -_CREEP), np.maximum(highest.min(axis=0), _CREEP)
+        self._way.min_velocity, self._way.max_velocity = list(lowest), list(highest)
         self._way.current_position = list(self.position)
         self._way.current_velocity = list(self.velocity)
         self._way.current_acceleration = list(self.acceleration)
         self._way.target_position = list(target.position)
-        self._way.target_velocity = list(np.clip(target.velocity, -room, room))
+        # A little less, since Ruckig wants a target that could be left again.
+        self._way.target_velocity = list(np.clip(target.velocity, 0.999 * lowest, 0.999 * highest))
         self._way.target_acceleration = [0.0] * 7
         way = Trajectory(7)
         # Not `update`, which takes an input that did not change for one that it has answered already.
@@ -211,7 +225,7 @@ class CommandLimiter:
             raise RuntimeError(f"no stop from {position}, {velocity}, {acceleration}: {result}")
         return stop
 
-    def _keeps_to_ranges(self, stop: Trajectory) -> bool:
+    def _ends_in_ranges(self, stop: Trajectory) -> bool:
         """Whether a stop ends in the joints' ranges, or not further outside than it began.
 
         On its way there it goes beyond both by micrometres at most, which is what the margin is for.
@@ -219,3 +233,12 @@ class CommandLimiter:
         start, end = np.array(stop.at_time(0.0)[0]), np.array(stop.at_time(stop.duration)[0])
         lower, upper = np.minimum(self._lower, start), np.maximum(self._upper, start)
         return bool(((lower - 1e-9 <= end) & (end <= upper + 1e-9)).all())
+
+    def _is_slow_enough(self, stop: Trajectory) -> bool:
+        """Whether no joint is anywhere on the way of a stop faster than it may be there."""
+        if self._robot.slowing_down is None:  # the laws that made the step have kept to that
+            return True
+        times = np.linspace(0.0, stop.duration, _LOOKS)
+        position, velocity = np.array([stop.at_time(time)[:2] for time in times]).swapaxes(0, 1)
+        lowest, highest = self._velocity_range(position)
+        return bool(((lowest <= velocity) & (velocity <= highest)).all())

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.robot.command_limiter import CommandLimiter, CommandLimits, Target
+from riseg_drake.robot.limits import RobotLimits
 from riseg_drake.robot.supervisor import (
     MOVE,
     Cause,
@@ -32,7 +33,7 @@ LONGEST_STOP = 0.25
 class CommandParameters:
     """What the arm is sent, and when it must stop."""
 
-    mode: str = field(default=POSITION, metadata={"choices": (POSITION, VELOCITY)})
+    mode: str = field(default=VELOCITY, metadata={"choices": (POSITION, VELOCITY)})
     """What is commanded: joint angles or their velocities; the arm's driver must be in the same mode."""
     rate: float = 200.0
     """Commands a second."""
@@ -41,11 +42,11 @@ class CommandParameters:
     playout: PlayoutParameters = field(default_factory=PlayoutParameters)
     safety: SafetyParameters = field(default_factory=SafetyParameters)
 
-    def check(self) -> None:
-        """Raise ValueError for settings with which the arm could not stop in time."""
+    def check(self, robot: RobotLimits) -> None:
+        """Raise ValueError for settings with which a robot could not stop in time."""
         if not 100 <= self.rate <= 1000:
             raise ValueError(f"rate: {self.rate} commands a second; expected 100 to 1000")
-        longest = self.limits.longest_stop()
+        longest = self.limits.longest_stop(robot)
         if longest > LONGEST_STOP:
             raise ValueError(
                 f"limits: a stop from full speed would take {longest:.2f} s, at most {LONGEST_STOP} s is "
@@ -97,9 +98,10 @@ class CommandStream:
     SLOW = 0.1
     """... and only while no joint is faster than this, rad/s: in fast motion lag looks like drift."""
 
-    def __init__(self, parameters: CommandParameters, tip: TipGeometry):
-        parameters.check()
+    def __init__(self, parameters: CommandParameters, tip: TipGeometry, robot: RobotLimits):
+        parameters.check(robot)
         self._parameters = parameters
+        self._robot = robot
         self._tip = tip
         self.mode = parameters.mode
         self.period = 1 / parameters.rate
@@ -174,7 +176,7 @@ class CommandStream:
         if self._limiter is None:
             if not self.state.may_move or status is None:
                 return None
-            self._limiter = CommandLimiter(status.position, self.period, self._parameters.limits)
+            self._limiter = CommandLimiter(status.position, self._robot, self.period, self._parameters.limits)
             self._drift = np.zeros(7)
             self._playout.resume_near(status.position)
             return self._command()  # the first command: where the arm is

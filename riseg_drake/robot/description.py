@@ -21,8 +21,8 @@ class PandaDescription:
     """The arm, and the pusher with its camera. URLs are `package://` or `file://`."""
 
     robot: str = field(default="panda", metadata={"choices": tuple(ROBOTS)})
-    """Whose limits hold: those of the Panda (Franka Emika Robot) or of the Franka Research 3; their links are of
-    the same lengths, so that one model draws both."""
+    """Whose limits hold, whatever the model says: the Panda's (Franka Emika Robot) or the Franka Research 3's.
+    Their links are of the same lengths, so that one model draws both."""
     arm_url: str = f"package://{MODELS_PACKAGE}/panda/panda.urdf"
     """Or the official description: package://drake_models/franka_description/urdf/panda_arm.urdf."""
     pusher_url: str = f"package://{MODELS_PACKAGE}/pusher/pusher.sdf"
@@ -89,6 +89,7 @@ def add_panda(plant: MultibodyPlant, description: PandaDescription) -> PandaPart
         plant.GetFrameByName("pusher", pusher),
         RigidTransform(RollPitchYaw(0, 0, description.tool_yaw), np.zeros(3)),
     )
+    _set_limits(plant, arm, description.limits)
     tip_frame = plant.GetFrameByName("tip", pusher)
     camera_frame = plant.GetFrameByName("camera", pusher)
     if description.X_EC:
@@ -99,3 +100,11 @@ def add_panda(plant: MultibodyPlant, description: PandaDescription) -> PandaPart
         X_EC = RigidTransform(RollPitchYaw(description.X_EC[3:]), description.X_EC[:3])
         camera_frame = plant.AddFrame(FixedOffsetFrame("calibrated_camera", tip_frame, X_EC, pusher))
     return PandaParts(arm=arm, pusher=pusher, tip_frame=tip_frame, camera_frame=camera_frame)
+
+
+def _set_limits(plant: MultibodyPlant, arm: ModelInstanceIndex, limits: RobotLimits) -> None:
+    for index, name in enumerate(JOINT_NAMES):
+        joint = plant.GetJointByName(name, arm)
+        joint.set_position_limits([limits.position_lower[index]], [limits.position_upper[index]])
+        joint.set_velocity_limits([-limits.velocity[index]], [limits.velocity[index]])
+        joint.set_acceleration_limits([-limits.acceleration[index]], [limits.acceleration[index]])

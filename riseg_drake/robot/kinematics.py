@@ -12,7 +12,6 @@ from pydrake.planning import RobotDiagramBuilder
 
 from riseg_drake.robot.description import PandaDescription, add_panda
 from riseg_drake.robot.inverse import panda_postures
-from riseg_drake.robot.limits import PANDA_LIMITS
 
 LIMIT_MARGIN = 0.05
 """Room that solutions keep to the ends of the joints' ranges, rad."""
@@ -22,7 +21,7 @@ MIN_CLEARANCE = 0.003
 READY = np.array([0.0, -0.1, 0.0, -2.4, 0.0, 2.3, 0.0])
 """An elbow-up posture amid the joints' ranges, tool pointing down, rad; where a search starts."""
 
-_FREE_ANGLES = np.linspace(PANDA_LIMITS.position_lower[6], PANDA_LIMITS.position_upper[6], 181)
+_FREE_ANGLES = 181  # of joint 7 are tried for a pose
 _TABLE_SIZE = (4.0, 4.0, 1.0)
 
 
@@ -39,9 +38,12 @@ class PandaKinematics:
     """The arm with its tool, alone above the table z = 0. Not for use by several threads at once."""
 
     def __init__(self, description: PandaDescription | None = None):
+        description = description or PandaDescription()
+        self.limits = description.limits
+        """What the robot's joints can do."""
         builder = RobotDiagramBuilder(time_step=0.0)
         self.plant = builder.plant()
-        self.parts = add_panda(self.plant, description or PandaDescription())
+        self.parts = add_panda(self.plant, description)
         table = self.plant.RegisterCollisionGeometry(
             self.plant.world_body(),
             RigidTransform([0, 0, -_TABLE_SIZE[2] / 2]),
@@ -118,8 +120,9 @@ class PandaKinematics:
 
     def postures(self, X_WE: NDArray, margin: float = LIMIT_MARGIN) -> NDArray[np.float64]:
         """A dense sample [N, 7] of postures with the tip at X_WE [4, 4], `margin` rad inside limits."""
-        q = panda_postures(X_WE @ self.X_EF, _FREE_ANGLES)
-        return q[(PANDA_LIMITS.room(q) >= margin).all(axis=1)]
+        ends = self.limits.position_lower[6], self.limits.position_upper[6]
+        q = panda_postures(X_WE @ self.X_EF, np.linspace(*ends, _FREE_ANGLES))
+        return q[(self.limits.room(q) >= margin).all(axis=1)]
 
     def solve_ik(
         self,
@@ -134,7 +137,7 @@ class PandaKinematics:
         liking for room to the joints' limits.
         """
         q = self.postures(X_WE, margin)
-        order = np.argsort(np.abs(q - q_near).max(axis=1) - 0.2 * PANDA_LIMITS.room(q).min(axis=1))
+        order = np.argsort(np.abs(q - q_near).max(axis=1) - 0.2 * self.limits.room(q).min(axis=1))
         for candidate in q[order]:
             if self.clearance(candidate) >= min_clearance:
                 return candidate
@@ -157,7 +160,7 @@ class PandaKinematics:
         q = np.asarray(q_start, np.float64)
         for X_WE in path:
             step = self._follow(X_WE, q)
-            if step is None or not PANDA_LIMITS.contains(step, margin) or self.clearance(step) < min_clearance:
+            if step is None or not self.limits.contains(step, margin) or self.clearance(step) < min_clearance:
                 return None
             q = step
             traced.append(q)
@@ -165,7 +168,7 @@ class PandaKinematics:
 
     def _follow(self, X_WE: NDArray, q: NDArray) -> NDArray[np.float64] | None:
         """The posture at X_WE that continues q: converged to 1 um and 1 urad, or None."""
-        half_range = (PANDA_LIMITS.position_upper - PANDA_LIMITS.position_lower) / 2
+        half_range = (self.limits.position_upper - self.limits.position_lower) / 2
         for iteration in range(20):
             error = pose_error(self.X_WE(q), X_WE)
             if np.abs(error).max() < 1e-6:
@@ -175,7 +178,7 @@ class PandaKinematics:
             dq = J_pinv @ error
             if iteration == 0:
                 # Grows steeply near a limit; bounded by the step itself, so that the path stays smooth.
-                crowding = ((q - PANDA_LIMITS.position_middle) / half_range) ** 5 / half_range
+                crowding = ((q - self.limits.position_middle) / half_range) ** 5 / half_range
                 away = -(crowding - J_pinv @ (J @ crowding))
                 dq += 0.3 * np.linalg.norm(error) * np.clip(away, -1, 1)
             q = q + np.clip(dq, -0.3, 0.3)

@@ -16,7 +16,7 @@ def _row(*values: float) -> NDArray[np.float64]:
 class SlowingDown:
     """How the greatest speed falls towards the end of a joint's range; rows of [7], read-only.
 
-    At a distance d, rad, from the end that the joint moves towards, it is sqrt(2 deceleration d) - offset, rad/s.
+    At a distance d, rad, from the end that it moves towards it is sqrt(2 deceleration d) - offset, rad/s.
     """
 
     deceleration: NDArray[np.float64]
@@ -25,7 +25,7 @@ class SlowingDown:
     """rad/s"""
 
     def speed(self, distance: NDArray) -> NDArray[np.float64]:
-        """The greatest speed, rad/s, at distances [..., 7], rad, from the end; 0 nearer than some milliradians."""
+        """The greatest speed, rad/s, at distances [..., 7], rad, from the end; 0 within some milliradians."""
         return np.maximum(np.sqrt(2 * self.deceleration * np.maximum(distance, 0)) - self.offset, 0)
 
 

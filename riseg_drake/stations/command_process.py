@@ -88,7 +88,7 @@ class CommandProcess:
     """
 
     def __init__(self, lcm: LcmConfig, parameters: CommandParameters, panda: PandaDescription):
-        parameters.check()
+        parameters.check(panda.limits)
         spawn = multiprocessing.get_context("spawn")
         self._connection, theirs = spawn.Pipe()
         self._lock = threading.Lock()
@@ -207,7 +207,7 @@ def stream_commands(
     signal.signal(signal.SIGTERM, lambda *_: interrupted.set())
     kinematics = PandaKinematics(panda)
     tip = TipGeometry(lambda q: kinematics.X_WE(q)[:3, 3], kinematics.tip_jacobian)
-    stream = CommandStream(parameters, tip)
+    stream = CommandStream(parameters, tip, panda.limits)
     news = _News(lcm)
     be_prompt(PRIORITY)
     connection.send("ready")

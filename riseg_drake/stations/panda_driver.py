@@ -17,7 +17,7 @@ import numpy as np
 from drake import lcmt_panda_command, lcmt_panda_status
 from numpy.typing import NDArray
 
-from riseg_drake.robot.limits import PANDA_LIMITS, RobotLimits
+from riseg_drake.robot.limits import RobotLimits
 from riseg_drake.stations.motion_judge import MotionJudge
 from riseg_drake.stations.panda_robot import MOVE, REFLEX, USER_STOPPED, PandaRobot
 from riseg_drake.stations.rate_limiter import TICK, low_pass_gain
@@ -36,7 +36,7 @@ _EXPECTED = {
 class PandaDriverConfig:
     """How the driver was started, how strict the robot is, and how well it measures itself."""
 
-    control_mode: str = field(default="position", metadata={"choices": ("status_only", "velocity", "position")})
+    control_mode: str = field(default="velocity", metadata={"choices": ("status_only", "velocity", "position")})
     """The driver's --control_mode."""
     expire_sec: float = 0.1
     """Age by wall clock at which a command has expired, s."""
@@ -80,7 +80,7 @@ class PandaDriver:
     robot. `config` is how it was started.
     """
 
-    def __init__(self, config: PandaDriverConfig, q: NDArray, limits: RobotLimits = PANDA_LIMITS):
+    def __init__(self, config: PandaDriverConfig, q: NDArray, limits: RobotLimits):
         self.config = config
         self._gain = low_pass_gain(config.low_pass_freq)
         self.robot = PandaRobot(limits, q)

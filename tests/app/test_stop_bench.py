@@ -21,7 +21,7 @@ def commands(deceleration: float, speed: float = 0.4, cause: float = 1.0) -> lis
 
 @pytest.mark.parametrize("share", [0.3, 0.9, 1.5])
 def test_time_and_acceleration_are_those_of_the_stop(share):
-    stop = judged(commands(share * ALLOWED), 101.0, PARAMETERS)
+    stop = judged(commands(share * ALLOWED), 101.0, PARAMETERS, PANDA_LIMITS)
     assert stop.seconds == pytest.approx(0.4 / (share * ALLOWED), abs=2 / PARAMETERS.rate)
     assert stop.acceleration == pytest.approx(share, rel=0.05)
 
@@ -29,9 +29,9 @@ def test_time_and_acceleration_are_those_of_the_stop(share):
 def test_a_command_that_was_lost_does_not_look_like_acceleration():
     sent = commands(0.5 * ALLOWED)
     del sent[100], sent[204]
-    assert judged(sent, 101.0, PARAMETERS).acceleration == pytest.approx(0.5, rel=0.1)
+    assert judged(sent, 101.0, PARAMETERS, PANDA_LIMITS).acceleration == pytest.approx(0.5, rel=0.1)
 
 
 def test_an_arm_that_never_moved_proves_nothing():
     with pytest.raises(RuntimeError, match="did not move"):
-        judged([(t / 200, np.zeros(7)) for t in range(100)], 0.3, PARAMETERS)
+        judged([(t / 200, np.zeros(7)) for t in range(100)], 0.3, PARAMETERS, PANDA_LIMITS)

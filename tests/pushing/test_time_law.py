@@ -34,7 +34,7 @@ def test_steady_profile_holds_one_speed_between_its_ramps():
 def test_motion_stays_within_its_share_of_the_limits_and_uses_one_of_them(profile):
     limits = SpeedLimits(velocity=0.5, acceleration=0.4, jerk=0.02)
     bend = (FROM + TO) / 2 + [0, 0.1, 0.1, 0, 0, -0.1, 0]
-    motion = rest_to_rest(np.array([FROM, bend, TO]), profile, limits)
+    motion = rest_to_rest(np.array([FROM, bend, TO]), profile, limits, PANDA_LIMITS)
     time = np.linspace(0, motion.end_time(), 2000)
     allowed = [
         limits.velocity * PANDA_LIMITS.velocity,
@@ -51,7 +51,7 @@ def test_motion_stays_within_its_share_of_the_limits_and_uses_one_of_them(profil
 
 
 def test_motion_begins_and_ends_at_rest_at_its_waypoints():
-    motion = rest_to_rest(np.array([FROM, TO]), minimum_jerk, SpeedLimits())
+    motion = rest_to_rest(np.array([FROM, TO]), minimum_jerk, SpeedLimits(), PANDA_LIMITS)
     velocity = motion.MakeDerivative(1)
     assert motion.value(0)[:, 0] == pytest.approx(FROM)
     assert motion.value(motion.end_time())[:, 0] == pytest.approx(TO)
@@ -61,5 +61,5 @@ def test_motion_begins_and_ends_at_rest_at_its_waypoints():
 
 def test_motion_takes_at_least_the_time_asked_for():
     assert rest_to_rest(
-        np.array([FROM, TO]), minimum_jerk, SpeedLimits(), shortest=9.0
+        np.array([FROM, TO]), minimum_jerk, SpeedLimits(), PANDA_LIMITS, shortest=9.0
     ).end_time() == pytest.approx(9.0)

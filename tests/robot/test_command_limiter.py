@@ -33,7 +33,7 @@ def until_rest(limiter, target, most=3000):
 
 
 def test_the_first_commands_are_where_the_arm_is():
-    limiter = CommandLimiter(READY)
+    limiter = CommandLimiter(READY, PANDA_LIMITS)
     np.testing.assert_array_equal(limiter.follow(still(READY)), READY)
     np.testing.assert_array_equal(limiter.stop(), READY)
 
@@ -41,8 +41,8 @@ def test_the_first_commands_are_where_the_arm_is():
 def test_a_planned_motion_comes_out_as_it_went_in():
     rng = np.random.default_rng(0)
     way = READY + np.cumsum(rng.normal(scale=0.08, size=(10, 7)), axis=0)
-    path = rest_to_rest(way, minimum_jerk, SpeedLimits(0.3, 0.25, 0.1))
-    limiter = CommandLimiter(way[0])
+    path = rest_to_rest(way, minimum_jerk, SpeedLimits(0.3, 0.25, 0.1), PANDA_LIMITS)
+    limiter = CommandLimiter(way[0], PANDA_LIMITS)
     for t in np.arange(PERIOD, path.end_time(), PERIOD):
         target = Target(*(path.EvalDerivative(t, order)[:, 0] for order in range(3)))
         np.testing.assert_allclose(limiter.follow(target), target.position, rtol=0, atol=2e-5)
@@ -50,7 +50,7 @@ def test_a_planned_motion_comes_out_as_it_went_in():
 
 def test_a_step_becomes_a_motion_within_limits_that_arrives():
     limits = CommandLimits()
-    commands = until_rest(CommandLimiter(READY, PERIOD, limits), still(READY + 0.5))
+    commands = until_rest(CommandLimiter(READY, PANDA_LIMITS, PERIOD, limits), still(READY + 0.5))
     velocity, acceleration, jerk = shares(np.vstack([READY, READY, commands, commands[-1], commands[-1]]))
     assert velocity <= limits.velocity + 1e-6
     assert acceleration <= limits.acceleration + 1e-6
@@ -58,7 +58,7 @@ def test_a_step_becomes_a_motion_within_limits_that_arrives():
 
 
 def test_a_target_beyond_a_joint_is_not_followed_out_of_its_range():
-    limiter = CommandLimiter(READY)
+    limiter = CommandLimiter(READY, PANDA_LIMITS)
     beyond = PANDA_LIMITS.position_upper + 1
     for _ in range(1500):
         limiter.follow(still(beyond))
@@ -70,7 +70,7 @@ def test_a_target_beyond_a_joint_is_not_followed_out_of_its_range():
 
 def test_an_arm_that_was_put_beyond_its_margin_by_hand_may_come_back():
     start = PANDA_LIMITS.position_upper - 0.01
-    limiter = CommandLimiter(start)
+    limiter = CommandLimiter(start, PANDA_LIMITS)
     for back in np.arange(0, 0.1, 0.0005):
         limiter.follow(still(start - back))
         assert not limiter.held_back
@@ -78,7 +78,7 @@ def test_an_arm_that_was_put_beyond_its_margin_by_hand_may_come_back():
 
 
 def test_a_target_that_races_towards_the_end_of_a_range_is_given_up_in_time():
-    limiter = CommandLimiter(READY)
+    limiter = CommandLimiter(READY, PANDA_LIMITS)
     racing = np.zeros(7)
     racing[5] = CommandLimits().velocity * PANDA_LIMITS.velocity[5]
     held_back = False
@@ -95,7 +95,7 @@ def test_the_longest_stop_is_no_longer_than_said():
     longest = 0
     for seed in range(40):
         rng = np.random.default_rng(seed)
-        limiter = CommandLimiter(READY, PERIOD, limits)
+        limiter = CommandLimiter(READY, PANDA_LIMITS, PERIOD, limits)
         goal = READY + rng.choice([-0.5, 0.5], 7)
         for _ in range(rng.integers(1, 120)):
             limiter.follow(still(goal))
@@ -104,7 +104,7 @@ def test_the_longest_stop_is_no_longer_than_said():
             limiter.stop()
             periods += 1
         longest = max(longest, periods)
-    assert longest * PERIOD <= limits.longest_stop() + PERIOD
+    assert longest * PERIOD <= limits.longest_stop(PANDA_LIMITS) + PERIOD
     assert longest * PERIOD > 0.05  # the test has seen real stops
 
 

@@ -30,7 +30,7 @@ class Arm:
         self.p_WE = np.array([0.5, 0.0, 0.2])
         tip = TipGeometry(lambda q: self.p_WE, lambda q: np.eye(6, 7) if jacobian is None else jacobian)
         self.parameters = CommandParameters(mode=mode)
-        self.stream = CommandStream(self.parameters, tip)
+        self.stream = CommandStream(self.parameters, tip, PANDA_LIMITS)
         self.now = 1000.0
         self.status = ArmStatus(self.now, READY.copy(), np.zeros(7), np.zeros(7), MOVE)
         self.image_time = self.now
@@ -62,7 +62,7 @@ class Arm:
 
     def plan(self, q_to):
         limits = SpeedLimits(0.3, 0.25, 0.1)
-        path = rest_to_rest(np.linspace(self.status.position, q_to, 12), minimum_jerk, limits)
+        path = rest_to_rest(np.linspace(self.status.position, q_to, 12), minimum_jerk, limits, PANDA_LIMITS)
         for t in np.arange(0, path.end_time() + 1, 0.01):
             self.stream.add_target(self.now + t, path.value(min(t, path.end_time()))[:, 0])
         return path
@@ -270,7 +270,7 @@ def test_a_plan_that_leads_out_of_the_workspace_is_a_stop_within_it():
     arm = Arm()
     lowest = arm.parameters.safety.workspace_lower[2] = 0.03
     arm.stream = CommandStream(
-        arm.parameters, TipGeometry(lambda q: kinematics.X_WE(q)[:3, 3], kinematics.tip_jacobian)
+        arm.parameters, TipGeometry(lambda q: kinematics.X_WE(q)[:3, 3], kinematics.tip_jacobian), PANDA_LIMITS
     )
     arm.step()
     down = kinematics.solve_ik(tip_pointing_down([0.48, 0.0, 0.01], 0.0))
@@ -301,8 +301,8 @@ def test_contact_is_allowed_in_a_push_only():
 
 def test_speeds_from_which_the_arm_could_not_stop_in_time_are_refused():
     with pytest.raises(ValueError, match="lower velocity"):
-        CommandParameters(limits=CommandLimits(velocity=1.0, stop_acceleration=0.5)).check()
-    assert CommandLimits().longest_stop() < LONGEST_STOP
+        CommandParameters(limits=CommandLimits(velocity=1.0, stop_acceleration=0.5)).check(PANDA_LIMITS)
+    assert CommandLimits().longest_stop(PANDA_LIMITS) < LONGEST_STOP
 
 
 def random_trial(seed):
@@ -319,7 +319,8 @@ def random_trial(seed):
     arm.step()
     goal = start + rng.normal(scale=rng.choice([0.05, 0.3, 1.0]), size=7)
     shares = rng.uniform(0.05, 1.0)  # also plans that are too fast
-    path = rest_to_rest(np.linspace(start, goal, 12), minimum_jerk, SpeedLimits(shares, shares, shares))
+    limits = SpeedLimits(shares, shares, shares)
+    path = rest_to_rest(np.linspace(start, goal, 12), minimum_jerk, limits, PANDA_LIMITS)
     jump = rng.random() < 0.2  # a plan that breaks
     period = rng.choice([0.005, 0.01, 0.02])
     feed = [

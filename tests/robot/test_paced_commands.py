@@ -3,6 +3,7 @@ import pytest
 
 from riseg_drake.robot.command_stream import ArmStatus, CommandParameters, CommandStream, TipGeometry
 from riseg_drake.robot.kinematics import READY
+from riseg_drake.robot.limits import PANDA_LIMITS
 from riseg_drake.robot.paced_commands import LONGEST_PAUSE, PacedCommands
 from riseg_drake.robot.supervisor import MOVE
 
@@ -16,7 +17,7 @@ class Client:
     def __init__(self, mode="position"):
         parameters = CommandParameters(mode=mode)
         tip = TipGeometry(lambda q: np.array([0.5, 0.0, 0.2]), lambda q: np.eye(6, 7))
-        self.stream = CommandStream(parameters, tip)
+        self.stream = CommandStream(parameters, tip, PANDA_LIMITS)
         for t in np.arange(0, 5, 0.01):
             self.stream.add_target(WALL + t, READY + FAST * t)
         self.paced = PacedCommands(self.stream, STEADY)

@@ -49,7 +49,7 @@ class DriverAndStream:
         self.parameters = parameters or CommandParameters()
         self.parameters.mode = mode
         self.driver = PandaDriver(PandaDriverConfig(control_mode=mode, **driver), q, limits)
-        self.stream = CommandStream(self.parameters, tip or ideal_tip())
+        self.stream = CommandStream(self.parameters, tip or ideal_tip(), limits)
         self.paced = PacedCommands(self.stream, STEADY)
         self.now = 0.0
         self.stalls = {"asleep": 0.0, "at work": 0.0}

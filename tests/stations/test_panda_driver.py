@@ -29,7 +29,7 @@ class Session:
 
     def __init__(self, mode="position", **config):
         self.mode = mode
-        self.driver = PandaDriver(PandaDriverConfig(control_mode=mode, **config), READY)
+        self.driver = PandaDriver(PandaDriverConfig(control_mode=mode, **config), READY, PANDA_LIMITS)
         self.now = START
 
     def wait(self, ticks):

@@ -14,6 +14,7 @@ from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.pushing.push import ArmPhase, Push
 from riseg_drake.pushing.push_path import PushPath
 from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest
+from riseg_drake.robot.limits import PANDA_LIMITS
 from riseg_drake.systems.arm_motion import ArmMotion, ArmMotionParameters, Permission
 
 Q_OBSERVE = np.array([0.0, -0.54, 0.0, -2.55, 0.0, 2.01, 0.0])
@@ -23,8 +24,9 @@ SECONDS = 1 / 15
 
 def push_to(q_there, start_offset=0.0, at=0.0):
     """A push whose path goes to q_there and back, in no time to speak of."""
-    there = rest_to_rest(np.array([Q_OBSERVE + start_offset, q_there]), minimum_jerk, SpeedLimits())
-    back = rest_to_rest(np.array([q_there, Q_OBSERVE + start_offset]), minimum_jerk, SpeedLimits())
+    q_from = Q_OBSERVE + start_offset
+    there = rest_to_rest(np.array([q_from, q_there]), minimum_jerk, SpeedLimits(), PANDA_LIMITS)
+    back = rest_to_rest(np.array([q_there, q_from]), minimum_jerk, SpeedLimits(), PANDA_LIMITS)
     middle = there.end_time()
     back.shiftRight(middle)
     there.ConcatenateInTime(back)
