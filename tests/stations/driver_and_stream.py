@@ -52,6 +52,7 @@ class DriverAndStream:
         self.stream = CommandStream(self.parameters, tip or ideal_tip(), limits)
         self.paced = PacedCommands(self.stream, STEADY)
         self.now = 0.0
+        self._ticks = 0
         self.stalls = {"asleep": 0.0, "at work": 0.0}
         self.status = None
         """The newest that the client has heard: old once the driver is gone."""
@@ -73,8 +74,9 @@ class DriverAndStream:
         return WALL + self.now
 
     def tick(self):
-        """One millisecond of driver and robot, and what the driver publishes then."""
-        self.now += TICK
+        """The next millisecond of driver and robot, and what the driver publishes then."""
+        self._ticks += 1
+        self.now = TICK * self._ticks
         self.driver.tick(round(1e6 * self.wall))
         robot, config = self.robot, self.driver.config
         self.trace.append((self.now, robot.mode, robot.q_d, robot.v_d))
@@ -93,7 +95,7 @@ class DriverAndStream:
     def let(self, seconds):
         """Time passes, without the client."""
         end = self.now + seconds
-        while self.now + TICK <= end + 1e-9:
+        while TICK * (self._ticks + 1) <= end + 1e-9:
             self.tick()
         self.now = end
 

@@ -36,6 +36,7 @@ class Robot:
     def __init__(self, config=None, faults=(), **driver):
         self.lcm = DrakeLcm("memq://")
         self.config = EmulatorConfig()
+        self.config.driver.control_mode = "position"
         for name, value in driver.items():
             setattr(self.config.driver, name, value)
         arm = EmulatedArm(config or one_toy(), self.config.driver, 0, WALL)
