@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.trajectories import PiecewisePolynomial
 
+from riseg_drake.geometry.se3 import translation
 from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest
-from riseg_drake.robot.kinematics import PandaKinematics
+from riseg_drake.robot.kinematics import MIN_CLEARANCE, PandaKinematics
 from riseg_drake.robot.supervisor import Mode
 from riseg_drake.stations.command_process import CommandProcess
 from riseg_drake.stations.hardware import TARGET_PERIOD
@@ -37,6 +38,59 @@ def straight_motion(
             "guide the arm by hand to nearer to it, tool down and well above the objects"
         )
     return rest_to_rest(way, minimum_jerk, limits, kinematics.limits)
+
+
+class WayBack:
+    """To where the arm looks from, from wherever somebody has put it: planned by one, begun by another."""
+
+    ABOVE = 0.25
+    """Things on the table are lower than this, m, or the pusher would be too short for them: the tip goes so
+    high before it goes anywhere else ..."""
+    RISE, HIGHEST = 0.02, 0.5
+    """... and up to the other height where the straight way is not free before, each time by the one, m."""
+
+    def __init__(
+        self, kinematics: PandaKinematics, q_observe: NDArray, limits: SpeedLimits, commands: CommandProcess
+    ):
+        self._kinematics, self._q_observe, self._limits = kinematics, q_observe, limits
+        self._commands = commands
+        self._motion: PiecewisePolynomial | None = None
+
+    def plan(self, q_from: NDArray) -> float:
+        """Find a way from a posture [7], rad; returns how long it takes, s. Raises TravelError."""
+        rise, X_WE = [q_from], self._kinematics.X_WE(q_from)
+        free = min(MIN_CLEARANCE, self._kinematics.clearance(q_from))
+        can_rise = True
+        while True:
+            can_rise = can_rise and X_WE[2, 3] < self.HIGHEST
+            if X_WE[2, 3] >= self.ABOVE or not can_rise:
+                try:
+                    across = straight_motion(self._kinematics, rise[-1], self._q_observe, self._limits)
+                except TravelError:
+                    if not can_rise:
+                        raise
+                else:
+                    self._motion = self._joined(rise, across)
+                    return self._motion.end_time()
+            X_WE = translation(np.array([0.0, 0.0, self.RISE])) @ X_WE
+            traced = self._kinematics.trace_ik([X_WE], rise[-1], min_clearance=free)
+            can_rise = traced is not None
+            rise.extend(traced or [])
+
+    def take(self) -> PiecewisePolynomial | None:
+        """The motion that was found, once: its targets are what the arm hears from now on."""
+        motion, self._motion = self._motion, None
+        if motion is not None:
+            self._commands.begin_path()
+        return motion
+
+    def _joined(self, rise: list[NDArray], across: PiecewisePolynomial) -> PiecewisePolynomial:
+        if len(rise) == 1:
+            return across
+        motion = rest_to_rest(np.array(rise), minimum_jerk, self._limits, self._kinematics.limits)
+        across.shiftRight(motion.end_time())
+        motion.ConcatenateInTime(across)
+        return motion
 
 
 def travel(

@@ -1,16 +1,17 @@
-"""Looks after a real arm while the diagram runs: stops, pauses, and when contact is planned."""
+"""Looks after a real arm while the diagram runs: stops, pauses, the way on, and when contact is planned."""
 
 import math
 import time
 
 from pydrake.systems.framework import Context
 
+from riseg_drake.app.arm_travel import TravelError, WayBack
 from riseg_drake.app.diagram import WiredDiagram
 from riseg_drake.app.interactions import Progress
 from riseg_drake.app.terminal_operator import TerminalOperator
 from riseg_drake.pushing.push import ArmPhase, Push
 from riseg_drake.robot.supervisor import Cause, Mode
-from riseg_drake.stations.command_process import CommandProcess
+from riseg_drake.stations.command_process import CommandProcess, StreamReport
 
 CONTACT_MARGIN = 0.3
 """Before and after a push contact is still no surprise, s."""
@@ -25,9 +26,17 @@ class ArmWatch:
     """A pause is not told again this soon, s."""
 
     def __init__(
-        self, wired: WiredDiagram, commands: CommandProcess, operator: TerminalOperator, progress: Progress
+        self,
+        wired: WiredDiagram,
+        commands: CommandProcess,
+        operator: TerminalOperator,
+        progress: Progress,
+        way_back: WayBack,
+        off_path: float,
     ):
+        """`off_path` is how far from its path the arm may go on with it, rad."""
         self._wired, self._commands, self._operator, self._progress = wired, commands, operator, progress
+        self._way_back, self._off_path = way_back, off_path
         self._push: Push | None = None
         self._next = 0.0
         self._said = Mode.FOLLOWING
@@ -46,7 +55,8 @@ class ArmWatch:
             return False
         state = report.state
         if state.mode is Mode.STOPPED:
-            self._ask(state.cause.value)
+            if report.words == self._commands.words:  # else it is of before the operator's word
+                self._ask(report)
         elif state.mode is Mode.ENDED or report.refused:
             self._progress.end = report.refused or state.cause.value
         elif state.mode is Mode.PAUSED and self._said is not Mode.PAUSED:
@@ -59,7 +69,8 @@ class ArmWatch:
         now = time.monotonic()
         if now - self._told.get(cause, -math.inf) >= self.QUIET:
             self._told[cause] = now
-            self._operator.tell(f"paused: {cause.value}")
+            hint = "; a driver that has ended must be started again" if cause is Cause.STATUS_OLD else ""
+            self._operator.tell(f"paused: {cause.value}{hint}")
 
     def _announce_contact(self, context: Context) -> None:
         push: Push | None = self._wired.read("active_push", context)
@@ -73,12 +84,30 @@ class ArmWatch:
             start + push.path.push_start - CONTACT_MARGIN, start + push.path.push_end + CONTACT_MARGIN
         )
 
-    def _ask(self, cause: str) -> None:
+    def _ask(self, report: StreamReport) -> None:
         """Have the operator say how it goes on after a stop."""
+        cause = report.state.cause.value
         said = self._operator.released(f"the arm is stopped: {cause}")
         if said is None:
             return
         if said:
-            self._commands.release()
+            self._go_on(report)
         else:
             self._progress.end = f"the arm was stopped: {cause}"
+
+    def _go_on(self, report: StreamReport) -> None:
+        """On the path where the arm is on it; else back to where it looks from, if there is a way."""
+        if report.off_path <= self._off_path or report.status is None:
+            self._operator.tell("the arm goes on with its path")
+            self._commands.release()
+            return
+        try:
+            seconds = self._way_back.plan(report.status.position)
+        except TravelError as error:
+            self._operator.tell(f"the arm stays stopped: {error}")
+            return
+        self._operator.tell(
+            f"the arm is {report.off_path:.2f} rad off its path: it gives up what it was doing, and goes to "
+            f"where it looks from in {seconds:.1f} s"
+        )
+        self._commands.release(anew=True)

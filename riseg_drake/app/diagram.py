@@ -16,6 +16,7 @@ from pydrake.systems.framework import (
     OutputPort,
     PortDataType,
 )
+from pydrake.trajectories import PiecewisePolynomial
 
 from riseg_drake.app.meshcat_view import MeshcatView
 from riseg_drake.app.planned_speed import push_parameters
@@ -43,6 +44,8 @@ class Drivers:
     """What arm and camera say."""
     sink: TargetSink | None = None
     """Who moves the arm; None: nobody."""
+    way_back: Callable[[], PiecewisePolynomial | None] | None = None
+    """Asked again and again for a motion back to where the arm looks from, after it was moved by hand."""
 
 
 class WiredDiagram:
@@ -173,7 +176,8 @@ def make_diagram(
     planner = builder.AddSystem(PushPlanner(kinematics, push_parameters(scenario), seed))
     sink = drivers.sink if drivers else None
     done_until = sink.done_until if sink else None
-    arm = builder.AddSystem(ArmMotion(q_observe, scenario.arm, permit, done_until))
+    way_back = drivers.way_back if drivers else None
+    arm = builder.AddSystem(ArmMotion(q_observe, scenario.arm, permit, done_until, way_back))
 
     for name, port in STATION_PORTS.items():
         builder.Connect(station.GetOutputPort(port), segmentation.inputs[name])

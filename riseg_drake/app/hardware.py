@@ -10,7 +10,7 @@ from pydrake.geometry import Meshcat, StartMeshcat
 from pydrake.systems.framework import Context
 from rich.console import Console
 
-from riseg_drake.app.arm_travel import ARRIVED, straight_motion, travel
+from riseg_drake.app.arm_travel import ARRIVED, WayBack, straight_motion, travel
 from riseg_drake.app.arm_watch import ArmWatch
 from riseg_drake.app.diagram import Drivers, WiredDiagram, make_diagram
 from riseg_drake.app.dry_run import DryRun
@@ -165,11 +165,12 @@ class _Session:
                 CommandProcess(self._config.lcm, self._config.command, self._config.panda)
             )
             self._go_to(q_observe, kinematics, commands)
+            way_back = WayBack(kinematics, q_observe, planned_limits(self._scenario), commands)
             wired = make_diagram(
                 self._scenario,
                 self._seed,
                 self._meshcat,
-                drivers=Drivers(self._reception, commands),
+                drivers=Drivers(self._reception, commands, way_back.take),
                 permit=self._operator.permit,
             )
             listeners: list[Listener] = []
@@ -178,7 +179,8 @@ class _Session:
                     wired, self._scenario, self._seed, self._truth, self._folder.path / RECORDING
                 )
                 listeners.append(stack.enter_context(recording))
-            watch = ArmWatch(wired, commands, self._operator, self._progress)
+            off_path = self._config.command.safety.off_path
+            watch = ArmWatch(wired, commands, self._operator, self._progress, way_back, off_path)
             self._interact(wired, watch, listeners)
             self._folder.note(pauses=watch.pauses)
         if len(commands.send_times) > 1:

@@ -1,6 +1,10 @@
-"""The command path: targets and status in, one command every 5 ms out, or none while the arm is not ready.
+"""The command path: targets and status in, one command every 5 ms out, or none while nobody should hear one.
 
 All of it is arithmetic on what it is given, time included; the process around it only waits and sends.
+
+Silence is what keeps the arm from moving unasked. A driver that was started anew follows whatever it hears; so
+once the arm's status is too old and the commands are at rest nothing is sent, and when its status has ended
+nothing is until the operator says so. What is sent first then is where the arm was measured to be.
 """
 
 from collections.abc import Callable
@@ -20,6 +24,7 @@ from riseg_drake.robot.supervisor import (
     SafetyState,
     ended,
     released,
+    status_is_old,
     supervise,
 )
 from riseg_drake.robot.target_playout import PlayoutParameters, TargetPlayout
@@ -34,7 +39,8 @@ class CommandParameters:
     """What the arm is sent, and when it must stop."""
 
     mode: str = field(default=VELOCITY, metadata={"choices": (POSITION, VELOCITY)})
-    """What is commanded: joint angles or their velocities; the arm's driver must be in the same mode."""
+    """What is commanded: joint angles or their velocities; the arm's driver must be in the same mode. It
+    filters what it hears: at 200 Hz velocities leave it calm, and positions at the limits of acceleration."""
     rate: float = 200.0
     """Commands a second."""
     limits: CommandLimits = field(default_factory=CommandLimits)
@@ -67,6 +73,9 @@ class ArmStatus:
     torque_external: NDArray[np.float64]
     """External torques as the driver gives them, N m [7]; only their size is used."""
     robot_mode: int
+    gap: float | None = None
+    """Largest time between the stamps of two statuses, one after the other, from the one that was handed on
+    before this up to this one, s; None where those in between were not seen."""
 
     def shifted(self, offset: float) -> "ArmStatus":
         """The same, said `offset` s later."""
@@ -91,12 +100,19 @@ class TipGeometry:
 class CommandStream:
     """See above. `state` is what the supervisor thinks; `position` what was commanded last, rad [7]."""
 
-    DRIFT_GAIN = 1.0
+    DRIFT_GAIN = 5.0
     """Velocity mode: the arm's drift is taken back with this rate, 1/s ..."""
     DRIFT_SPEED = 0.01
     """... at most this fast, rad/s, ..."""
     SLOW = 0.1
     """... and only while no joint is faster than this, rad/s: in fast motion lag looks like drift."""
+    DRIFT_NOTICED, DRIFT_LEFT = 3e-4, 1e-4
+    """Drift counts from the one on, until less than the other is left, rad: seven joints together are then
+    within a millimetre at the tip, and noise, of which the filter leaves a sixth, moves nothing."""
+    DRIFT_FILTER = 0.1
+    """Time constant of the filter of measured drift, s."""
+    LAG = 0.01
+    """How long after a command the arm is there, s: half a period, and the driver's low pass of 30 Hz."""
 
     def __init__(self, parameters: CommandParameters, tip: TipGeometry, robot: RobotLimits):
         parameters.check(robot)
@@ -107,15 +123,22 @@ class CommandStream:
         self.period = 1 / parameters.rate
         """Time from one step to the next, s."""
         self._playout = TargetPlayout(parameters.playout)
+        self._takes_targets = True
         self._limiter: CommandLimiter | None = None  # None: the next command is where the arm is
+        self._is_silent = True
         self._drift = np.zeros(7)
+        self._drift_seen = np.zeros(7)
+        self._drift_taken_back = np.zeros(7, bool)
         self._contacts: list[tuple[float, float]] = []
+        self._status: ArmStatus | None = None
         self.state = SafetyState()
+        self.words = 0
+        """How often the operator has said that the arm may move again."""
 
     @property
     def position(self) -> NDArray[np.float64] | None:
         """The last command, rad [7]; None while none is sent."""
-        return None if self._limiter is None else self._limiter.position
+        return None if self._limiter is None or self._is_silent else self._limiter.position
 
     @property
     def behind(self) -> float:
@@ -132,17 +155,34 @@ class CommandStream:
         """Whether commands stand still."""
         return self._limiter is None or self._limiter.at_rest
 
+    @property
+    def off_path(self) -> float:
+        """How far the arm is from its path, rad; see SafetyParameters.off_path."""
+        return 0.0 if self._status is None else self._playout.distance(self._start(self._status))
+
     def add_target(self, time: float, position: NDArray) -> None:
         """Joint angles [7], rad, for a wall time, s. Raises ValueError where it cannot be taken."""
-        self._playout.add(time, position)
+        if self._takes_targets:
+            self._playout.add(time, position)
 
     def expect_contact(self, start: float, end: float) -> None:
         """Targets between these times, s, are a push: the force allowed is that of a push."""
         self._contacts = [(a, b) for a, b in self._contacts if b > (self._playout.time or 0.0)]
         self._contacts.append((start, end))
 
+    def abandon_path(self) -> None:
+        """Forget all targets, and those to come until `begin_path`: they lead where the arm is not."""
+        self._playout.drop()
+        self._contacts = []
+        self._takes_targets = False
+
+    def begin_path(self) -> None:
+        """Targets from now on are of a path that begins where the arm is."""
+        self._takes_targets = True
+
     def release(self) -> None:
         """The operator's word that a stopped arm may move again."""
+        self.words += 1
         self.state = released(self.state)
         if self._limiter is not None:
             self._limiter.held_back = False
@@ -151,9 +191,7 @@ class CommandStream:
         """Go on from joint angles [7], rad, where the arm came to rest because nothing was sent for long."""
         if self._limiter is None:
             return
-        self._limiter.restart(position)
-        self._drift = np.zeros(7)
-        self._playout.halt()
+        self._rest_at(position)
         self._playout.resume_near(position)
 
     def end(self, cause: Cause) -> None:
@@ -168,44 +206,87 @@ class CommandStream:
 
         `now` and `image_time`, that of the newest picture, are in s.
         """
-        could_move = self.state.may_move
-        target = self._playout.advance(self.period) if could_move else None
-        self.state = supervise(self.state, self._look(now, status, image_time, target), self._parameters.safety)
-        if self.state.may_move and not could_move and self._limiter is not None:
-            self._playout.resume_near(self._limiter.position - self._drift)
-        if self._limiter is None:
-            if not self.state.may_move or status is None:
-                return None
-            self._limiter = CommandLimiter(status.position, self._robot, self.period, self._parameters.limits)
-            self._drift = np.zeros(7)
-            self._playout.resume_near(status.position)
-            return self._command()  # the first command: where the arm is
-        if self.state.may_move and could_move and target is not None:
-            self._correct_drift(status)
+        before = self.state
+        target = self._playout.advance(self.period) if before.may_move else None
+        seen = self._look(now, status, image_time, target)
+        if before.mode is not Mode.WAITING or self.at_rest:  # a word that came while it brakes has to wait
+            self.state = supervise(before, seen, self._parameters.safety)
+        if self.state.may_move and not before.may_move:
+            assert status is not None
+            self._set_out(before, status)
+        elif self.state.may_move and target is not None:
+            assert self._limiter is not None
+            self._correct_drift(now)
             self._limiter.follow(target._replace(position=target.position + self._drift))
-        else:
+        elif self._limiter is not None:
             self._limiter.stop()
         if not self.state.may_move:
             self._playout.halt()
-            if status is not None and status.robot_mode != MOVE and self._limiter.at_rest:
-                # It follows nothing now; when it is ready again, it begins anew from where it is.
-                self._limiter = None
-                return np.zeros(7) if self.mode == VELOCITY else None
-        return self._command()
+        return self._fall_silent() if self._has_no_hearer(seen) else self._command()
+
+    def _set_out(self, before: SafetyState, status: ArmStatus) -> None:
+        """Begin to move, or go on after a pause, at the path's nearest point; stay where that is too far."""
+        if before.mode is Mode.PAUSED:
+            assert self._limiter is not None
+            here = self._limiter.stop() - self._drift
+        else:
+            here = self._start(status)
+            if not self._playout.distance(here) <= self._parameters.safety.off_path:
+                self.state = SafetyState(Mode.STOPPED, Cause.GAP)
+                return
+            self._rest_at(here)
+        self._playout.resume_near(here)
+
+    def _start(self, status: ArmStatus) -> NDArray[np.float64]:
+        """Where commands begin at the operator's word, rad [7]: where the arm is, or where they hold it."""
+        if self._limiter is None or self.mode == VELOCITY:
+            return status.position
+        return self._limiter.position
+
+    def _rest_at(self, position: NDArray) -> None:
+        """Commands are those of an arm at rest at joint angles [7], rad."""
+        if self._limiter is None:
+            self._limiter = CommandLimiter(position, self._robot, self.period, self._parameters.limits)
+        self._limiter.restart(position)
+        self._drift, self._drift_seen = np.zeros(7), np.zeros(7)
+        self._playout.halt()
+
+    def _has_no_hearer(self, seen: Observation) -> bool:
+        """Whether a command would be heard by nobody, or by somebody who was not there when it was planned."""
+        if self._limiter is None or self.state.may_move:
+            return self._limiter is None
+        if self._is_silent:
+            return True
+        is_lost = seen.robot_mode != MOVE or self.state.cause is Cause.STATUS_ENDED
+        if is_lost and not seen.lag <= self._parameters.safety.largest_gap:
+            return True
+        return self._limiter.at_rest and (is_lost or status_is_old(seen, self._parameters.safety))
+
+    def _fall_silent(self) -> NDArray[np.float64] | None:
+        """Send nothing more, in velocity mode after a last zero."""
+        last = np.zeros(7) if self.mode == VELOCITY and not self._is_silent else None
+        self._is_silent = True
+        if self.state.mode is not Mode.PAUSED:  # a pause goes on from where it was
+            self._limiter = None
+        return last
 
     def _command(self) -> NDArray[np.float64]:
         assert self._limiter is not None
+        self._is_silent = False
         return self._limiter.velocity if self.mode == VELOCITY else self._limiter.position
 
     def _look(
         self, now: float, status: ArmStatus | None, image_time: float | None, target: Target | None
     ) -> Observation:
+        gap = self._gap_before(status)
+        self._status = status
         limiter, measured = self._limiter, np.zeros(7) if status is None else status.position
         rest = measured if limiter is None else limiter.rest_position - self._drift
         time = self._playout.time
         return Observation(
             now=now,
             status_time=None if status is None else status.time,
+            status_gap=gap,
             robot_mode=0 if status is None else status.robot_mode,
             image_time=image_time,
             in_motion=self._playout.in_motion,
@@ -219,14 +300,34 @@ class CommandStream:
             else _largest(target.position + self._drift - limiter.position),
         )
 
-    def _correct_drift(self, status: ArmStatus | None) -> None:
+    def _gap_before(self, status: ArmStatus | None) -> float:
+        """Largest time between statuses since the last one, s; 0 where there is no other."""
+        last = self._status
+        if status is None or last is None or status.time == last.time:
+            return 0.0
+        if status.time < last.time:  # a clock was set, or another driver speaks
+            return np.inf
+        return status.time - last.time if status.gap is None else status.gap
+
+    def _correct_drift(self, now: float) -> None:
         """Velocity mode: what was commanded is not quite where the arm came to."""
-        assert self._limiter is not None
-        if self.mode != VELOCITY or status is None or _largest(self._limiter.velocity) > self.SLOW:
+        if self.mode != VELOCITY:
             return
-        error = self._limiter.position - self._drift - status.position
-        speed = np.clip(self.DRIFT_GAIN * error, -self.DRIFT_SPEED, self.DRIFT_SPEED)
-        self._drift = self._drift + speed * self.period
+        assert self._limiter is not None
+        assert self._status is not None
+        speed = self._limiter.velocity
+        if _largest(speed) > self.SLOW:
+            self._drift_seen = np.zeros(7)
+            return
+        told = self._limiter.position - self._drift - (now - self._status.time + self.LAG) * speed
+        share = self.period / (self.period + self.DRIFT_FILTER)
+        was_noticed = self._drift_taken_back
+        self._drift_seen = self._drift_seen + share * (told - self._status.position - self._drift_seen)
+        self._drift_taken_back = np.abs(self._drift_seen) > np.where(
+            was_noticed, self.DRIFT_LEFT, self.DRIFT_NOTICED
+        )
+        rate = np.clip(self.DRIFT_GAIN * self._drift_seen, -self.DRIFT_SPEED, self.DRIFT_SPEED)
+        self._drift = self._drift + self.period * rate * self._drift_taken_back
 
 
 def _largest(difference: NDArray) -> float:

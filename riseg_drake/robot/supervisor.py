@@ -1,7 +1,16 @@
 """When the arm may move: a state machine on plain values, asked once for every command.
 
-No motion before the arm has told where it is. What only concerns news (status or images too old) makes a
-pause that ends by itself; everything else holds until the operator says otherwise; Ctrl-C is the end.
+No motion before the arm has told where it is. News that is late, of arm or camera, makes a pause that ends by
+itself; everything else holds until the operator says otherwise; Ctrl-C is the end. The states, what is sent in
+each and what leads out of it stand in a table in docs/hardware.md.
+
+Late or ended? An arm whose driver has died, after a reflex, a user stop or a crash, says nothing but that its
+status ends, and may be moved by hand before a new driver speaks. The robot gives up control some 20 ms after
+the last packet of its driver, and a driver takes 0.5 s and more to start and recover. So stamps of statuses
+that fill the time belong to one control of the arm, however late they come; a gap between two of them of more
+than `status_gap`, which lies between those two figures, is the end of one and the beginning of another.
+
+Numbers are compared so that one that is none (NaN) is a danger.
 """
 
 from dataclasses import dataclass, field, replace
@@ -20,6 +29,9 @@ class SafetyParameters:
 
     status_age: float = 0.1
     """Oldest status in motion and at rest, s."""
+    status_gap: float = 0.1
+    """Largest time between the stamps of two statuses, one after the other, of a driver that was there all
+    along, s; see above."""
     image_age: float = 0.5
     """Oldest picture while the arm moves, s; age counts from the picture's own time stamp."""
     contact_force: float = 15.0
@@ -33,14 +45,18 @@ class SafetyParameters:
     largest_gap: float = 0.1
     """The arm may be this far from where it is told to be, and its targets from there, rad."""
     fresh_for: float = 0.3
-    """A pause ends when nothing has been too old for this long, s."""
+    """A pause ends when nothing has been too old for this long, s; by then the arm is at rest."""
+    displacement: float = 0.01
+    """After a pause the arm must be this near to where it is told to be, rad; contact makes less."""
+    off_path: float = 0.02
+    """A path is gone on with where the arm is this near to it, rad."""
 
 
 class Mode(Enum):
     """What the arm may do."""
 
     WAITING = "waiting for the arm"
-    """No status yet, or the arm is not ready to move."""
+    """No status yet; or the operator's word came, and nothing was looked at since."""
     FOLLOWING = "following"
     PAUSED = "paused"
     """At rest, or coming to it; goes on by itself."""
@@ -55,6 +71,8 @@ class Cause(Enum):
 
     NONE = ""
     STATUS_OLD = "the arm's status is too old"
+    STATUS_ENDED = "the arm's status ended: its driver, or the robot itself, has stopped"
+    MOVED = "the arm is not where it was held"
     IMAGES_OLD = "the camera's images are too old"
     REFLEX = "the arm stopped by reflex"
     USER_STOP = "the arm's user stop is pressed"
@@ -77,6 +95,8 @@ class Observation:
     """Wall time, s."""
     status_time: float | None
     """Of the newest status, s; None before the first."""
+    status_gap: float
+    """Largest time between the stamps of two statuses, one after the other, since the last look, s."""
     robot_mode: int
     image_time: float | None
     """Of the newest picture, s; None before the first."""
@@ -115,23 +135,31 @@ def supervise(state: SafetyState, seen: Observation, parameters: SafetyParameter
     """The state after one look."""
     if state.mode is Mode.ENDED:
         return state
+    lost = _loss(seen, parameters)
     if state.mode is Mode.STOPPED:
         # What the arm itself says is the more important news.
-        worse = _arm_refuses(seen)
-        return state if worse is Cause.NONE else replace(state, cause=worse)
+        return state if lost is Cause.NONE else replace(state, cause=lost)
+    old = status_is_old(seen, parameters)
     if state.mode is Mode.WAITING:
-        ready = seen.status_time is not None and seen.robot_mode == MOVE and not _too_old(seen, parameters)
-        return SafetyState(Mode.FOLLOWING) if ready else state
-    danger = _arm_refuses(seen) if _arm_refuses(seen) is not Cause.NONE else _danger(seen, parameters)
+        if seen.status_time is None:
+            return state
+        refusal = lost if lost is not Cause.NONE else Cause.STATUS_OLD if old else Cause.NONE
+        return SafetyState(Mode.FOLLOWING) if refusal is Cause.NONE else SafetyState(Mode.STOPPED, refusal)
+    if lost is not Cause.NONE:
+        return SafetyState(Mode.STOPPED, lost)
+    if old:  # what it told last says nothing of where the arm is now
+        return SafetyState(Mode.PAUSED, Cause.STATUS_OLD)
+    danger = _danger(seen, parameters)
     if danger is not Cause.NONE:
         return SafetyState(Mode.STOPPED, danger)
-    late = _too_old(seen, parameters)
-    if late:
-        return SafetyState(Mode.PAUSED, late)
+    if seen.in_motion and not _is_recent(seen.image_time, seen.now, parameters.image_age):
+        return SafetyState(Mode.PAUSED, Cause.IMAGES_OLD)
     if state.mode is Mode.PAUSED:
         since = seen.now if state.fresh_since is None else state.fresh_since
         if seen.now - since < parameters.fresh_for:
             return replace(state, fresh_since=since)
+        if not seen.lag <= parameters.displacement:
+            return SafetyState(Mode.STOPPED, Cause.MOVED)
     return SafetyState(Mode.FOLLOWING)
 
 
@@ -145,31 +173,34 @@ def ended(cause: Cause) -> SafetyState:
     return SafetyState(Mode.ENDED, cause)
 
 
-def _arm_refuses(seen: Observation) -> Cause:
-    """Why the arm itself does not take commands."""
-    if seen.robot_mode == MOVE or seen.status_time is None:
+def status_is_old(seen: Observation, parameters: SafetyParameters) -> bool:
+    """Whether the arm says nothing at present."""
+    return not _is_recent(seen.status_time, seen.now, parameters.status_age)
+
+
+def _is_recent(time: float | None, now: float, age: float) -> bool:
+    """Whether news of a time, s, is at most `age` s old; what is of a time to come is as wrong as old."""
+    return time is not None and -age <= now - time <= age
+
+
+def _loss(seen: Observation, parameters: SafetyParameters) -> Cause:
+    """Why the arm does not take commands any more, as far as its status tells."""
+    if seen.status_time is None:
         return Cause.NONE
-    return {REFLEX: Cause.REFLEX, USER_STOPPED: Cause.USER_STOP}.get(seen.robot_mode, Cause.NOT_READY)
+    if seen.robot_mode != MOVE:
+        return {REFLEX: Cause.REFLEX, USER_STOPPED: Cause.USER_STOP}.get(seen.robot_mode, Cause.NOT_READY)
+    return Cause.NONE if seen.status_gap <= parameters.status_gap else Cause.STATUS_ENDED
 
 
 def _danger(seen: Observation, parameters: SafetyParameters) -> Cause:
     """What must not go on unless a person has looked at it."""
     allowed = parameters.push_force if seen.contact_planned else parameters.contact_force
-    if seen.tip_force > allowed:
+    if not seen.tip_force <= allowed:
         return Cause.FORCE
     if seen.held_back:
         return Cause.JOINT_LIMIT
-    if (seen.p_WE < parameters.workspace_lower).any() or (seen.p_WE > parameters.workspace_upper).any():
+    if not ((seen.p_WE >= parameters.workspace_lower) & (seen.p_WE <= parameters.workspace_upper)).all():
         return Cause.WORKSPACE
-    if seen.lag > parameters.largest_gap:
+    if not seen.lag <= parameters.largest_gap:
         return Cause.NOT_FOLLOWING
-    return Cause.GAP if seen.gap > parameters.largest_gap else Cause.NONE
-
-
-def _too_old(seen: Observation, parameters: SafetyParameters) -> Cause | None:
-    """Which news is too old, if any."""
-    if seen.status_time is None or seen.now - seen.status_time > parameters.status_age:
-        return Cause.STATUS_OLD
-    if seen.in_motion and (seen.image_time is None or seen.now - seen.image_time > parameters.image_age):
-        return Cause.IMAGES_OLD
-    return None
+    return Cause.NONE if seen.gap <= parameters.largest_gap else Cause.GAP

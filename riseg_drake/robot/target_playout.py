@@ -6,6 +6,7 @@ their own. Where they run out the clock slows down, smoothly and ahead of time, 
 late then, but never off its path, and nothing ever jumps.
 """
 
+from bisect import bisect_right
 from collections import deque
 from dataclasses import dataclass
 
@@ -25,7 +26,7 @@ class PlayoutParameters:
     slope: float = 2.0
     """The clock's rate changes by at most this much a second, 1/s: from full speed to standstill in 0.5 s."""
     longest: float = 120.0
-    """Targets are kept for this long at most, s; when the arm is further behind, new ones are refused."""
+    """So much motion may wait at most, s; when the arm is further behind, new targets are refused."""
 
 
 class TargetPlayout:
@@ -34,6 +35,9 @@ class TargetPlayout:
     `time` is what is played out now, s, None before the first target; `rate` how fast it goes, 0 to 1.
     """
 
+    REACH = 1.0
+    """After a stop the path goes on at most this far from where it was left, s: braking takes the arm some
+    tenths ahead, one whose driver died is as far behind; and a path that comes back is not cut short."""
     RESERVE = 0.03
     """The clock stands still this long before the last target, s: the motion beyond is not known yet."""
 
@@ -58,17 +62,22 @@ class TargetPlayout:
     def add(self, time: float, position: NDArray) -> None:
         """Take in a target: joint angles [7], rad, for a time, s, later than all before.
 
+        Of a posture that is held the first and the last two are kept: that may take as long as it likes.
+
         Raises ValueError for a time that is not, and where too much is waiting already.
         """
         if self.time is None:
             self.time = time - self._parameters.delay
         elif time <= self._times[-1]:
             raise ValueError(f"a target for {time} s comes after one for {self._times[-1]} s")
-        elif self.remaining > self._parameters.longest:
+        elif self._last_change - self.time > self._parameters.longest:
             raise ValueError(f"targets of more than {self._parameters.longest} s are waiting")
         position = np.asarray(position, np.float64)
         if self._positions and not np.array_equal(position, self._positions[-1]):
             self._last_change = time
+        elif len(self._positions) > 3 and np.array_equal(position, self._positions[-4]):
+            self._times[-2], self._times[-1] = self._times[-1], time
+            return
         self._times.append(time)
         self._positions.append(position)
 
@@ -95,18 +104,29 @@ class TargetPlayout:
         self._positions.clear()
         self._last_change, self.time, self.rate = -np.inf, None, 0.0
 
-    def resume_near(self, position: NDArray, reach: float = 0.5) -> None:
-        """Go on from the point of the path nearest to `position` [7]: where it is, or up to `reach` s ahead."""
-        if self.time is None:
-            return
-        here = self.time
-        ahead = [time for time in self._times if here < time <= here + reach]
-        self.time = min([here, *ahead], key=lambda t: float(np.abs(self._at(t).position - position).max()))
+    def resume_near(self, position: NDArray) -> None:
+        """Go on from the point of the path nearest to `position` [7], a little ahead or behind."""
+        if self.time is not None:
+            self.time = self._nearest(position)[1]
+
+    def distance(self, position: NDArray) -> float:
+        """How far `position` [7] is from the part of the path where `resume_near` looks, rad; 0 without any."""
+        return 0.0 if self.time is None else self._nearest(position)[0]
+
+    def _nearest(self, position: NDArray) -> tuple[float, float]:
+        """Distance, rad, and time, s, of the nearest point of the path within REACH s."""
+        assert self.time is not None
+        near = [k for k, time in enumerate(self._times) if abs(time - self.time) <= self.REACH]
+        times = [self.time, *(self._times[k] for k in near)]
+        positions = np.array([self._at(self.time).position, *(self._positions[k] for k in near)])
+        distances = np.abs(positions - position).max(axis=1)
+        nearest = int(np.argmin(distances))
+        return float(distances[nearest]), times[nearest]
 
     def _forget(self) -> None:
-        """Drop what no interpolation needs any more."""
+        """Drop what neither interpolation nor the way back to the path needs any more."""
         assert self.time is not None
-        while len(self._times) > 3 and self._times[2] < self.time:
+        while len(self._times) > 3 and self._times[2] < self.time - self.REACH:
             self._times.popleft()
             self._positions.popleft()
 
@@ -136,11 +156,9 @@ class TargetPlayout:
         return Target(position, self.rate * velocity, self.rate**2 * acceleration)
 
     def _interval(self, time: float) -> int | None:
-        """k with times[k] <= time < times[k + 1]; None outside. What was forgotten makes k small."""
-        for k in range(len(self._times) - 1):
-            if time < self._times[k + 1]:
-                return k if time >= self._times[k] else None
-        return None
+        """k with times[k] <= time < times[k + 1]; None outside."""
+        k = bisect_right(self._times, time) - 1
+        return k if 0 <= k < len(self._times) - 1 else None
 
     def _derivatives(self, k: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Velocity and acceleration at target k."""

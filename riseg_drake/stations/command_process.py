@@ -64,6 +64,10 @@ class StreamReport:
     done_until: float
     """Targets up to this time have been gone through, s; minus infinity before the first."""
     at_rest: bool
+    off_path: float = 0.0
+    """How far the arm is from its path, rad."""
+    words: int = 0
+    """How many words of the operator this report knows of."""
     refused: str = ""
     """Why targets were not taken, if they were not."""
 
@@ -93,6 +97,8 @@ class CommandProcess:
         self._connection, theirs = spawn.Pipe()
         self._lock = threading.Lock()
         self._report: StreamReport | None = None
+        self.words = 0
+        """How often the operator has said that the arm may move again."""
         self.send_times: NDArray[np.float64] = np.zeros(0)
         """When commands were sent, by a steady clock, s; there once the process has ended."""
         self._process = spawn.Process(
@@ -117,9 +123,19 @@ class CommandProcess:
         """Targets of these times, s, are a push."""
         self._send("contact", start, end)
 
-    def release(self) -> None:
-        """The operator's word that a stopped arm may move again."""
+    def release(self, anew: bool = False) -> None:
+        """The operator's word that a stopped arm may move again: on its path, or `anew` from where it is.
+
+        Then all targets are forgotten, and those to come until `begin_path`.
+        """
+        self.words += 1
+        if anew:
+            self._send("abandon")
         self._send("release")
+
+    def begin_path(self) -> None:
+        """Targets from now on are of a path that begins where the arm is."""
+        self._send("begin")
 
     def done_until(self) -> float:
         """Up to what time, s, targets have been gone through; as of the newest report."""
@@ -252,6 +268,10 @@ def _obey(connection: Connection, stream: CommandStream) -> str:
                     stream.expect_contact(*values)
                 case "release":
                     stream.release()
+                case "abandon":
+                    stream.abandon_path()
+                case "begin":
+                    stream.begin_path()
                 case "end":
                     stream.end(Cause.FINISHED)
     except ValueError as error:
@@ -269,6 +289,8 @@ def _report(stream: CommandStream, status: ArmStatus | None, refused: str) -> St
         behind=stream.behind,
         done_until=stream.done_until,
         at_rest=stream.at_rest,
+        off_path=stream.off_path if stream.state.mode is Mode.STOPPED else 0.0,
+        words=stream.words,
         refused=refused,
     )
 

@@ -26,7 +26,7 @@ def status_message(
 
 
 class IdealArm:
-    """Says what a Panda's driver says, and remembers what it is told. Nothing is checked or delayed."""
+    """Says what a Panda's driver says, and remembers what it is told. Nothing is checked, late or expires."""
 
     def __init__(self, config: LcmConfig):
         self._config = config
@@ -37,8 +37,9 @@ class IdealArm:
         self.mode: int = lcmt_panda_status.kMove
         self.torque_external: NDArray[np.float64] = np.zeros(7)
         """N m [7]"""
+        self._velocity: NDArray[np.float64] = np.zeros(7)
         self.commands: list[tuple[float, NDArray[np.float64]]] = []
-        """Stamps, s, and joint angles, rad [7], of all commands so far."""
+        """Stamps, s, of all commands so far, and the joint angles, rad [7], that it was told to be at then."""
 
     def speak(self) -> None:
         """Publish a status of now, and take in what has come."""
@@ -59,6 +60,11 @@ class IdealArm:
 
     def _take(self, data: bytes) -> None:
         command = lcmt_panda_command.decode(data)
-        if command.num_joint_position:
+        stamp = 1e-6 * command.utime
+        if command.num_joint_velocity:
+            if self.commands:
+                self.position = self.position + (stamp - self.commands[-1][0]) * self._velocity
+            self._velocity = np.array(command.joint_velocity)
+        else:
             self.position = np.array(command.joint_position)
-            self.commands.append((1e-6 * command.utime, self.position))
+        self.commands.append((stamp, self.position))

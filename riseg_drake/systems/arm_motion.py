@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
+from pydrake.trajectories import PiecewisePolynomial
 
 from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.pushing.push import ArmPhase, Push
@@ -57,9 +58,12 @@ class _Memory:
     """What the arm is doing now; None at the observation posture."""
     proposed: Push | None = None
     """What it would do next, and has not been permitted yet."""
+    way_back: PiecewisePolynomial | None = None
+    """What it does instead: it was moved by hand, and comes back to the observation posture."""
     start_time: float = 0.0
+    """Of that, or of the push, s."""
     end_time: float = -np.inf
-    """When the last push was over, as far as commands go, s."""
+    """When the last motion was over, as far as commands go, s."""
     offset: NDArray[np.float64] = field(default_factory=lambda: np.zeros(7))
     """Of the commanded joint angles from the path at its start, rad."""
     rest_since: float | None = None
@@ -89,7 +93,8 @@ class ArmMotion(LeafSystem):
         position_measured: the arm's joint angles [7], rad.
 
     Outputs:
-        position: commanded joint angles [7], rad; velocity and acceleration are continuous.
+        position: commanded joint angles [7], rad; velocity and acceleration are continuous, but for the
+            beginning of a way back.
         phase: ArmPhase.
         interaction_step: int, how many pushes are over.
         active_push: the Push that is being done, or waits for permission, or None.
@@ -98,6 +103,8 @@ class ArmMotion(LeafSystem):
     `permit` is asked about every push, again and again while it says WAIT; without it each is done.
     `done_until` tells up to what time, s, the commanded positions have been gone through, where that may be
     later than they are commanded: an arm that has not set out yet is also at rest where it should be.
+    `way_back` is asked at every look for a motion [7] over [0, T] s from where the arm is to q_observe, if it
+    was moved by hand: then whatever it does is given up, and a push counts as one that was made.
 
     No output depends on an input at the same moment: `tried_pushes` and `position` may be wired back to
     the planner.
@@ -109,6 +116,7 @@ class ArmMotion(LeafSystem):
         parameters: ArmMotionParameters | None = None,
         permit: Callable[[Push], Permission] | None = None,
         done_until: Callable[[], float] | None = None,
+        way_back: Callable[[], PiecewisePolynomial | None] | None = None,
     ):
         super().__init__()
         self.set_name("ArmMotion")
@@ -116,6 +124,7 @@ class ArmMotion(LeafSystem):
         self._parameters = parameters or ArmMotionParameters()
         self._permit = permit
         self._done_until = done_until
+        self._way_back = way_back
         anything = Value[object](None)
         self._push = self.DeclareAbstractInputPort("push", anything)
         self._pair = self.DeclareAbstractInputPort("pair", anything)
@@ -145,6 +154,8 @@ class ArmMotion(LeafSystem):
 
     def _command(self, memory: _Memory, time: float) -> NDArray[np.float64]:
         """The joint angles [7] to command at a time."""
+        if memory.way_back is not None:
+            return memory.way_back.value(min(time - memory.start_time, memory.way_back.end_time()))[:, 0]
         if memory.push is None or memory.push.path is None:
             return self._q_observe
         path, since = memory.push.path, time - memory.start_time
@@ -157,6 +168,8 @@ class ArmMotion(LeafSystem):
             return ArmPhase.DONE
         if memory.push is None or memory.push.path is None:
             return ArmPhase.OBSERVE
+        if memory.way_back is not None:
+            return ArmPhase.RETREAT
         return memory.push.path.phase(time - memory.start_time)
 
     def _update(self, context: Context, state: State) -> EventStatus:
@@ -168,7 +181,10 @@ class ArmMotion(LeafSystem):
         parameters, time = self._parameters, context.get_time()
         if memory.done:
             return memory
-        if memory.push is not None:
+        way_back = self._way_back() if self._way_back is not None else None
+        if way_back is not None:
+            return replace(memory, way_back=way_back, start_time=time, proposed=None, rest_since=None)
+        if memory.push is not None or memory.way_back is not None:
             return self._after_motion(memory, time)
         if memory.proposed is not None:
             return self._ask(memory, time)
@@ -226,17 +242,18 @@ class ArmMotion(LeafSystem):
         return memory
 
     def _after_motion(self, memory: _Memory, time: float) -> _Memory:
-        assert memory.push is not None
-        assert memory.push.path is not None
-        if time < memory.start_time + memory.push.path.duration:
+        if memory.way_back is not None:
+            duration = memory.way_back.end_time()
+        else:
+            assert memory.push is not None
+            assert memory.push.path is not None
+            duration = memory.push.path.duration
+        if time < memory.start_time + duration:
             return memory
-        return replace(
-            memory,
-            interaction_step=memory.interaction_step + 1,
-            unjudged=memory.push,
-            push=None,
-            end_time=time,
-        )
+        after = replace(memory, push=None, way_back=None, end_time=time)
+        if memory.push is None:
+            return after
+        return replace(after, interaction_step=memory.interaction_step + 1, unjudged=memory.push)
 
     def _judge(self, memory: _Memory, pair: FramePair, context: Context) -> _Memory:
         """Remember what the last push brought."""

@@ -1,4 +1,5 @@
 import os
+from collections import deque
 from dataclasses import replace
 from itertools import pairwise
 
@@ -15,22 +16,23 @@ from riseg_drake.robot.command_stream import (
     TipGeometry,
 )
 from riseg_drake.robot.kinematics import READY, PandaKinematics, tip_pointing_down
-from riseg_drake.robot.limits import PANDA_LIMITS
+from riseg_drake.robot.limits import FR3_LIMITS, PANDA_LIMITS
 from riseg_drake.robot.supervisor import MOVE, REFLEX, Cause, Mode
 
 PERIOD = 0.005
 TRIALS = int(os.environ.get("RISEG_COMMAND_TRIALS", "40"))
-"""Random plans in the last test; 10000 were run before this was released."""
+"""Random plans for each robot in the last test; 10000 were run before this was released."""
 
 
 class Arm:
     """An arm that does what it is told two periods later, with a command path before it."""
 
-    def __init__(self, mode="position", jacobian=None):
+    def __init__(self, mode="position", jacobian=None, robot=PANDA_LIMITS):
         self.p_WE = np.array([0.5, 0.0, 0.2])
         tip = TipGeometry(lambda q: self.p_WE, lambda q: np.eye(6, 7) if jacobian is None else jacobian)
         self.parameters = CommandParameters(mode=mode)
-        self.stream = CommandStream(self.parameters, tip, PANDA_LIMITS)
+        self.stream = CommandStream(self.parameters, tip, robot)
+        self.robot = robot
         self.now = 1000.0
         self.status = ArmStatus(self.now, READY.copy(), np.zeros(7), np.zeros(7), MOVE)
         self.image_time = self.now
@@ -38,6 +40,7 @@ class Arm:
         self.commands = []  # None where none was sent
         self.silent_status = False
         self.silent_images = False
+        self.gap = 0.001  # between two statuses, all of which are seen
 
     def step(self):
         command = self.stream.step(self.now, self.status, self.image_time)
@@ -47,11 +50,12 @@ class Arm:
                 command = self.coming[-1] + PERIOD * command
             self.coming.append(command.copy())
         elif command is None:
-            self.coming.append(self.status.position)
+            self.coming.append(self.coming[-1])  # it holds
         position = self.coming.pop(0) if len(self.coming) > 2 else self.coming[0]
         self.now += PERIOD
         if not self.silent_status:
-            self.status = replace(self.status, time=self.now, position=position)
+            self.status = replace(self.status, time=self.now, position=position, gap=self.gap)
+            self.gap = 0.001
         if not self.silent_images:
             self.image_time = self.now - 0.05
         return command
@@ -62,7 +66,7 @@ class Arm:
 
     def plan(self, q_to):
         limits = SpeedLimits(0.3, 0.25, 0.1)
-        path = rest_to_rest(np.linspace(self.status.position, q_to, 12), minimum_jerk, limits, PANDA_LIMITS)
+        path = rest_to_rest(np.linspace(self.status.position, q_to, 12), minimum_jerk, limits, self.robot)
         for t in np.arange(0, path.end_time() + 1, 0.01):
             self.stream.add_target(self.now + t, path.value(min(t, path.end_time()))[:, 0])
         return path
@@ -71,9 +75,9 @@ class Arm:
         return np.array([command for command in self.commands if command is not None])
 
 
-def in_motion(mode="position", jacobian=None):
+def in_motion(mode="position", jacobian=None, robot=PANDA_LIMITS):
     """An arm in the middle of a fast motion."""
-    arm = Arm(mode, jacobian)
+    arm = Arm(mode, jacobian, robot)
     arm.step()
     arm.plan(READY + 0.6)
     arm.run(1.3)
@@ -96,15 +100,29 @@ def stopping_time(arm):
     return PERIOD * (max(np.flatnonzero(moving), default=-1) + 1)
 
 
-def within_limits(commands):
+def within_limits(positions, robot=PANDA_LIMITS):
     """Whether positions [N, 7] at even periods, from rest, keep the limits of motion and stop."""
+    padded = np.vstack([positions[:1]] * 3 + [positions])
+    v, a, j = (np.diff(padded, order, axis=0) / PERIOD**order for order in (1, 2, 3))
+    return rates_within_limits(padded, v, a, j, robot)
+
+
+def velocities_within_limits(velocities, positions, robot=PANDA_LIMITS):
+    """The same for velocities [N, 7] that were commanded when the plan was at positions [N, 7]."""
+    padded = np.vstack([np.zeros((2, 7)), velocities])
+    a, j = (np.diff(padded, order, axis=0) / PERIOD**order for order in (1, 2))
+    return rates_within_limits(positions, velocities[1:], a, j, robot)
+
+
+def rates_within_limits(positions, v, a, j, robot):
     limits = CommandLimits()
-    padded = np.vstack([commands[:1]] * 3 + [commands])
-    v, a, j = (np.abs(np.diff(padded, order, axis=0)).max(axis=0) / PERIOD**order for order in (1, 2, 3))
+    # On the way from one position to the next a joint may be as fast as at the better of both.
+    lowest, highest = (limits.velocity * bound for bound in robot.velocity_range(positions))
+    lowest, highest = np.minimum(lowest[:-1], lowest[1:]), np.maximum(highest[:-1], highest[1:])
     return (
-        (v <= limits.velocity * PANDA_LIMITS.velocity * (1 + 1e-6) + 1e-9).all()
-        and (a <= limits.stop_acceleration * PANDA_LIMITS.acceleration * (1 + 1e-6) + 1e-6).all()
-        and (j <= limits.stop_jerk * PANDA_LIMITS.jerk * (1 + 1e-6) + 1e-3).all()
+        ((lowest * (1 + 1e-6) - 1e-9 <= v) & (v <= highest * (1 + 1e-6) + 1e-9)).all()
+        and (np.abs(a) <= limits.stop_acceleration * robot.acceleration * (1 + 1e-6) + 1e-6).all()
+        and (np.abs(j) <= limits.stop_jerk * robot.jerk * (1 + 1e-6) + 1e-3).all()
     )
 
 
@@ -207,12 +225,13 @@ def test_every_cause_brings_the_arm_to_rest_in_time_and_smoothly(happens, cause,
         assert within_limits(arm.sent())
 
 
-def test_an_old_status_pauses_and_the_motion_goes_on_from_where_it_was():
+def test_a_status_that_comes_late_pauses_and_the_motion_goes_on_from_where_it_was():
     arm = in_motion()
     arm.silent_status = True
     arm.run(1)
     assert arm.stream.state.mode is Mode.PAUSED
-    arm.silent_status = False
+    assert arm.commands[-1] is None
+    arm.silent_status = False  # every one of them comes at last
     arm.run(6)
     np.testing.assert_allclose(arm.sent()[-1], READY + 0.6, atol=1e-6)
     assert within_limits(arm.sent())
@@ -305,45 +324,43 @@ def test_speeds_from_which_the_arm_could_not_stop_in_time_are_refused():
     assert CommandLimits().longest_stop(PANDA_LIMITS) < LONGEST_STOP
 
 
-def random_trial(seed):
-    """Plans and disturbances at random; returns the runs of commands between silences."""
+ROBOTS = {"panda": PANDA_LIMITS, "fr3": FR3_LIMITS}
+
+
+def random_trial(seed, robot):
+    """Plans and disturbances at random; returns mode, and runs of commands and positions between silences."""
     rng = np.random.default_rng(seed)
-    arm = Arm()
+    arm = Arm(["position", "velocity"][seed % 2], robot=robot)
     arm.parameters.playout.delay = rng.choice([0.1, 0.3])
     start = np.clip(
-        PANDA_LIMITS.position_middle + rng.uniform(-0.6, 0.6, 7),
-        *(PANDA_LIMITS.position_lower + 0.1, PANDA_LIMITS.position_upper - 0.1),
+        robot.position_middle + rng.uniform(-0.6, 0.6, 7),
+        *(robot.position_lower + 0.1, robot.position_upper - 0.1),
     )
     arm.status = replace(arm.status, position=start)
     arm.coming = [start] * 2
     arm.step()
-    goal = start + rng.normal(scale=rng.choice([0.05, 0.3, 1.0]), size=7)
-    shares = rng.uniform(0.05, 1.0)  # also plans that are too fast
-    limits = SpeedLimits(shares, shares, shares)
-    path = rest_to_rest(np.linspace(start, goal, 12), minimum_jerk, limits, PANDA_LIMITS)
-    jump = rng.random() < 0.2  # a plan that breaks
-    period = rng.choice([0.005, 0.01, 0.02])
-    feed = [
-        (t, path.value(min(t, path.end_time()))[:, 0] + (jump and t > 0.5) * rng.normal(scale=0.03, size=7))
-        for t in np.arange(0, path.end_time() + 1, period)
-    ]
-    origin, burst = arm.now, rng.choice([0.01, 0.05, 0.3])
-    next_burst = origin
+    feed, positions = deque(random_plan(rng, arm, start)), [start]
+    burst = rng.choice([0.01, 0.05, 0.3])
+    next_burst = arm.now
     for tick in range(rng.integers(150, 450)):
         if arm.now >= next_burst:
-            while feed and origin + feed[0][0] <= arm.now:
-                t, q = feed.pop(0)
-                arm.stream.add_target(origin + t, q)
+            while feed and feed[0][0] <= arm.now:
+                arm.stream.add_target(*feed.popleft())
             next_burst = arm.now + burst * rng.uniform(0.5, 1.5)
         chance = rng.random() if tick > 60 else 1.0  # under way by then
         if chance < 0.005:
             arm.silent_status = not arm.silent_status
+            arm.gap = rng.choice([0.001, 0.5])
         elif chance < 0.01:
             arm.silent_images = not arm.silent_images
         elif chance < 0.013:
             reflex(arm)
         elif chance < 0.02:
             arm.status = replace(arm.status, robot_mode=MOVE, torque_external=np.zeros(7))
+            if arm.stream.off_path > 0.02:
+                arm.stream.abandon_path()
+                arm.stream.begin_path()
+                feed = deque(random_plan(rng, arm, arm.status.position))
             arm.stream.release()
         elif chance < 0.022:
             force(arm)
@@ -353,23 +370,43 @@ def random_trial(seed):
             arm.stream.end(Cause.INTERRUPT)
         arm.now += rng.choice([0.0, 0.0, 0.002, 0.02])  # the process is late
         arm.step()
+        limiter = arm.stream._limiter
+        positions.append(positions[-1] if limiter is None else limiter.position)
     runs, current = [], []
-    for command in [*arm.commands, None]:
+    for command, position in zip([*arm.commands, None], [*positions, None], strict=True):
         if command is not None:
-            current.append(command)
+            current.append((command, position))
         elif current:
-            runs.append(np.array(current))
+            runs.append(tuple(map(np.array, zip(*current, strict=True))))
             current = []
-    return runs
+    return arm.stream.mode, runs
 
 
+def random_plan(rng, arm, start):
+    """Targets of a motion from `start` by their times, some too fast, broken, or out of the joints' ranges."""
+    goal = start + rng.normal(scale=rng.choice([0.05, 0.3, 1.0]), size=7)
+    shares = rng.uniform(0.05, 1.0)
+    limits = SpeedLimits(shares, shares, shares)
+    everywhere = replace(arm.robot, slowing_down=None)
+    path = rest_to_rest(np.linspace(start, goal, 12), minimum_jerk, limits, everywhere)
+    jump = rng.random() < 0.2
+    for t in np.arange(0, path.end_time() + 1, rng.choice([0.005, 0.01, 0.02])):
+        q = path.value(min(t, path.end_time()))[:, 0]
+        yield arm.now + t, q + (jump and t > 0.5) * rng.normal(scale=0.03, size=7)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
 @pytest.mark.parametrize("first", range(0, TRIALS, 20))
-def test_random_plans_and_disturbances_never_lead_outside_the_limits(first):
-    motions = 0
+def test_random_plans_and_disturbances_never_lead_outside_the_limits(first, name):
+    robot, motions = ROBOTS[name], 0
     for seed in range(first, min(first + 20, TRIALS)):
-        for run in random_trial(seed):
-            assert within_limits(run), seed
-            if PANDA_LIMITS.contains(run[0]):
-                assert (PANDA_LIMITS.room(run) >= 0).all(), seed
-            motions += np.ptp(run, axis=0).max() > 0.01
+        mode, runs = random_trial(seed, robot)
+        for commands, positions in runs:
+            if mode == "position":
+                assert within_limits(commands, robot), seed
+            else:
+                assert velocities_within_limits(commands, positions, robot), seed
+            if robot.contains(positions[0]):
+                assert (robot.room(positions) >= 0).all(), seed
+            motions += np.ptp(positions, axis=0).max() > 0.01
     assert motions  # the test has seen some

@@ -24,7 +24,7 @@ class Client:
         self.measured = READY
 
     def next(self, t):
-        status = ArmStatus(WALL + t, self.measured, np.zeros(7), np.zeros(7), MOVE)
+        status = ArmStatus(WALL + t, self.measured, np.zeros(7), np.zeros(7), MOVE, gap=0.001)
         return self.paced.next(STEADY + t, WALL + t, status, WALL + t)
 
     def send(self, t):

@@ -20,6 +20,7 @@ from riseg_drake.robot.supervisor import (
 GOOD = Observation(
     now=10.0,
     status_time=9.99,
+    status_gap=0.005,
     robot_mode=MOVE,
     image_time=9.9,
     in_motion=True,
