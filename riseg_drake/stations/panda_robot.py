@@ -15,7 +15,7 @@ USER_STOPPED = lcmt_panda_status.kUserStopped
 
 HAND_SPEED = 0.3
 """A person guides the arm no faster than this, rad/s, ..."""
-_HAND_GAIN = 5.0  # 1/s; ... slows down towards the end ...
+_HAND_GAIN = 10.0  # 1/s; ... slows down towards the end ...
 _HAND_REACH = 1e-4  # rad; ... and lets go when every joint is so near to it
 
 

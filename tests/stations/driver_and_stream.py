@@ -13,6 +13,7 @@ from riseg_drake.robot.limits import PANDA_LIMITS
 from riseg_drake.robot.paced_commands import PacedCommands
 from riseg_drake.stations.command_process import command_message
 from riseg_drake.stations.panda_driver import PandaDriver, PandaDriverConfig
+from riseg_drake.stations.panda_robot import GUIDING
 
 WALL, STEADY = 1_700_000_000.0, 5000.0  # s, at the beginning
 TICK = 1e-3  # s
@@ -56,6 +57,7 @@ class DriverAndStream:
         self.stalls = {"asleep": 0.0, "at work": 0.0}
         self.status = None
         """The newest that the client has heard: old once the driver is gone."""
+        self._handed_on = None
         self.shows_pictures = True
         self._image_time = WALL
         self.torque_external = np.zeros(7)
@@ -90,7 +92,15 @@ class DriverAndStream:
                 robot.v_d + config.velocity_noise * velocity_error,
                 self.torque_external,
                 robot.mode,
+                gap=self._gap_now(),
             )
+
+    def _gap_now(self):
+        """Largest time between two statuses since the client was last handed one, s."""
+        if self.status is not None:
+            gap = self.wall - self.status.time
+            return gap if self.status is self._handed_on else max(gap, self.status.gap)
+        return 0.0
 
     def let(self, seconds):
         """Time passes, without the client."""
@@ -101,6 +111,7 @@ class DriverAndStream:
 
     def cycle(self):
         """One round of the client's process."""
+        self._handed_on = self.status
         command = self.paced.next(STEADY + self.now, self.wall, self.status, self._image_time)
         self.let(self.stalls["at work"])
         if command is not None and command.is_in_time(STEADY + self.now):
@@ -133,6 +144,7 @@ class DriverAndStream:
         self.robot.recover()
         self.driver.start(round(1e6 * self.wall))
         while not self.driver.is_connected:
+            assert self.driver.end is None, self.driver.end
             self.cycle()
         return self
 
@@ -141,7 +153,9 @@ class DriverAndStream:
         goal = self.robot.q_d.copy()
         goal[joint] += angle
         self.robot.guide(goal)
-        return self.run(2 + abs(angle) / 0.2)
+        while self.robot.mode == GUIDING:
+            self.cycle()
+        return self
 
     def fastest(self, since):
         """Largest speed of a joint since a time, s; rad/s."""
