@@ -12,6 +12,7 @@ from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest
 from riseg_drake.robot.kinematics import MIN_CLEARANCE, PandaKinematics
 from riseg_drake.robot.supervisor import Mode
 from riseg_drake.stations.command_process import CommandProcess
+from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.hardware import TARGET_PERIOD
 
 ARRIVED = 0.01
@@ -96,13 +97,16 @@ class WayBack:
 def travel(
     commands: CommandProcess,
     motion: PiecewisePolynomial,
+    clock: EvenClock,
     look: Callable[[], None] = lambda: None,
 ) -> None:
     """Have a motion done, and wait until the arm has arrived; `look` is called all the while.
 
+    `clock` is that of all targets.
+
     Raises TravelError if the arm is stopped on its way.
     """
-    start, duration = time.time(), motion.end_time()
+    start, duration = clock(), motion.end_time()
     for t in np.arange(0, duration + LINGER, TARGET_PERIOD):
         commands.send_target(start + t, motion.value(min(t, duration))[:, 0])
     goal = motion.value(duration)[:, 0]
@@ -116,7 +120,7 @@ def travel(
         if report.state.mode in (Mode.STOPPED, Mode.ENDED):
             raise TravelError(f"the arm was stopped: {report.state.cause.value}")
         arrived = report.status is not None and np.abs(report.status.position - goal).max() < ARRIVED
-        if arrived and report.behind == 0 and report.at_rest and time.time() > start + duration + LINGER:
+        if arrived and report.behind == 0 and report.at_rest and clock() > start + duration + LINGER:
             return
     cause = report.state.cause.value or "it did not arrive in time" if report else "it says nothing"
     raise TravelError(f"the arm did not get to where it should: {cause}")

@@ -11,7 +11,8 @@ from riseg_drake.app.interactions import Progress
 from riseg_drake.app.terminal_operator import TerminalOperator
 from riseg_drake.pushing.push import ArmPhase, Push
 from riseg_drake.robot.supervisor import Cause, Mode
-from riseg_drake.stations.command_process import CommandProcess, StreamReport
+from riseg_drake.stations.command_process import CommandProcess
+from riseg_drake.stations.command_session import StreamReport
 
 CONTACT_MARGIN = 0.3
 """Before and after a push contact is still no surprise, s."""

@@ -13,7 +13,7 @@ INTERRUPTED = 130  # 128 + SIGINT, as shells have it
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns its exit code: 0 done, 2 bad input, 130 interrupted."""
+    """Run one command; returns its exit code: 0 done, 2 bad input or not done, 130 interrupted."""
     chosen = command_line().parse_args(arguments)
     # Before numpy is imported: on matrices of six by six the threads of linear algebra only wait for each
     # other, and sums that they share come out differently in their last bits.
@@ -50,6 +50,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.app.graphics import NoGraphicsError
     from riseg_drake.app.hardware import HardwareError
     from riseg_drake.app.output import OutputError
+    from riseg_drake.app.run import RunStoppedError
     from riseg_drake.app.scenario_file import ScenarioError
     from riseg_drake.app.scene_pool import ClusterError
     from riseg_drake.evaluation.label_folders import LabelFolderError
@@ -76,6 +77,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
         ImageError,
         CommandError,
         HardwareError,
+        RunStoppedError,
         TravelError,
         WordError,
         ModelError,

@@ -6,6 +6,7 @@ import numpy as np
 from pydrake.geometry import Meshcat, Rgba
 from rich.console import Console
 
+from riseg_drake.app.interactions import Progress
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.terminal_operator import TerminalOperator
 from riseg_drake.pushing.push import Push
@@ -20,11 +21,18 @@ class DryRun:
     """A dry run's permission: every push is shown, with the way of the tip, and none is done."""
 
     def __init__(
-        self, scenario: Scenario, meshcat: Meshcat | None, operator: TerminalOperator | None, console: Console
+        self,
+        scenario: Scenario,
+        meshcat: Meshcat | None,
+        operator: TerminalOperator | None,
+        console: Console,
+        progress: Progress,
     ):
+        """`operator` None: nobody is asked. Why it ends is entered in `progress`."""
         self._kinematics = PandaKinematics(scenario.hardware.panda)
         self._most = scenario.arm.most_interactions
         self._meshcat, self._operator, self._console = meshcat, operator, console
+        self._progress = progress
         self._push: Push | None = None
         self._since = 0.0
         self._shown = 0
@@ -40,9 +48,17 @@ class DryRun:
                 return Permission.WAIT
         else:
             said = self._operator.answer(f"push {self._shown}: n for another, q to end", "n q")
+            if not said:
+                return Permission.WAIT
             if said != "n":
-                return Permission.WAIT if not said else Permission.END
-        return Permission.SKIP if self._shown < self._most else Permission.END
+                return self._end(self._operator.why_quit)
+        if self._shown < self._most:
+            return Permission.SKIP
+        return self._end(f"{self._shown} of {self._most} pushes were shown, and none was done")
+
+    def _end(self, why: str) -> Permission:
+        self._progress.end = why
+        return Permission.END
 
     def _draw(self, push: Push) -> None:
         assert push.path is not None

@@ -1,6 +1,5 @@
 """`riseg hand-eye`: is the camera where the scenario says? The arm moves over a scene that stands still."""
 
-import time
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +37,8 @@ def hand_eye_command(scenario_file: Path | None, output: Path | None, yes: bool,
     limits = planned_limits(scenario)
     operator = TerminalOperator(console, yes)
     with listening(config, replayed=False, truth=False) as (reception, _):
-        wait_for_drivers(reception, config)
+        with console.status("waiting for arm and camera") as status:
+            wait_for_drivers(reception, config, ready=True, say=status.update)
         camera = _Collector(reception, config.camera, kinematics)
         with CommandProcess(config.lcm, config.command, config.panda) as commands:
             operator.confirm("the arm goes to where it looks from, and 4 cm around; nothing else may move")
@@ -49,7 +49,7 @@ def hand_eye_command(scenario_file: Path | None, output: Path | None, yes: bool,
                 motion = straight_motion(kinematics, here, q, limits)
                 if index:
                     motion.ScaleTime(1 / SLOWER)
-                travel(commands, motion, camera.look if index else lambda: None)
+                travel(commands, motion, reception.clock, camera.look if index else lambda: None)
                 here = q
     errors = flow_errors(camera.frames)
     if not errors:
@@ -82,7 +82,7 @@ class _Collector:
     def __init__(self, reception: Reception, config: HardwareCameraConfig, kinematics: PandaKinematics):
         self._reception, self._config, self._kinematics = reception, config, kinematics
         self._silhouette = RobotSilhouette(kinematics, config.intrinsics)
-        self._newest = time.time()
+        self._newest = reception.clock()
         self.frames: list[Frame] = []
 
     def look(self) -> None:

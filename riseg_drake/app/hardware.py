@@ -6,6 +6,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
+from drake import lcmt_panda_status
 from pydrake.geometry import Meshcat, StartMeshcat
 from pydrake.systems.framework import Context
 from rich.console import Console
@@ -17,29 +18,44 @@ from riseg_drake.app.dry_run import DryRun
 from riseg_drake.app.interactions import Listener, Progress, TruthSource, WallClock, interactions
 from riseg_drake.app.output import RECORDING, RunFolder, Step
 from riseg_drake.app.planned_speed import planned_limits
-from riseg_drake.app.run import Narrator, report, state_of
+from riseg_drake.app.run import Narrator, RunStoppedError, report, state_of
 from riseg_drake.app.run_recording import recording_of
 from riseg_drake.app.scenario import HARDWARE, Scenario, load_scenario, scenario_name
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.terminal_operator import TerminalOperator
 from riseg_drake.app.truth_reception import TruthReception
+from riseg_drake.pushing.push import Push
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture
+from riseg_drake.robot.supervisor import MOVE
 from riseg_drake.stations.command_process import CommandProcess
-from riseg_drake.stations.hardware import HardwareStationConfig
+from riseg_drake.stations.hardware import HardwareStationConfig, as_drake_images
 from riseg_drake.stations.lcm_channels import open_lcm, receive_buffer_warning
-from riseg_drake.stations.lcm_images import decode_images
+from riseg_drake.stations.lcm_images import ImageError, decode_images
 from riseg_drake.stations.lcm_reception import Reception
 from riseg_drake.systems.arm_motion import Permission
 from riseg_drake.systems.stage_clock import StageClock
 
 PATIENCE = 20.0
 """Arm and camera must have been heard after this time, s."""
+ENDED = 1.0
+"""The arm's status has ended when the newest is older than this, s."""
 SILENCE = 5.0
 """A replayed log is over when nothing has come for this long, s."""
 
 
 class HardwareError(RuntimeError):
     """Arm or camera are not there; says in one line what is missing."""
+
+
+_MODES = {
+    lcmt_panda_status.kOther: "other",
+    lcmt_panda_status.kIdle: "idle: is the driver started with --control_mode=position or velocity?",
+    lcmt_panda_status.kGuiding: "guided by hand: let go of the guiding buttons",
+    lcmt_panda_status.kReflex: "reflex: unlock the robot in Desk and start the driver again",
+    lcmt_panda_status.kUserStopped: "user stopped: release the user stop and start the driver again",
+    lcmt_panda_status.kAutomaticErrorRecovery: "recovering from an error",
+}
+"""What a person does about each `robot_mode` in which the arm takes no commands."""
 
 
 def hardware_command(
@@ -71,11 +87,18 @@ def hardware_command(
     browser = StartMeshcat() if meshcat or dry_run else None
     operator = TerminalOperator(console, yes)
     with listening(config, replayed, truth) as (reception, truth_source):
-        with console.status("waiting for arm and camera"):
-            wait_for_drivers(reception, config)
+        with console.status("waiting for arm and camera") as status:
+            wait_for_drivers(reception, config, ready=not dry_run, say=status.update)
         session = _Session(scenario, seed, folder, reception, truth_source, operator, console, browser)
-        steps = session.run_dry(yes, replayed) if dry_run else session.run(record)
-    report(steps, console)
+        try:
+            if dry_run:
+                session.run_dry(yes, replayed)
+            else:
+                session.run(record)
+        except RunStoppedError:
+            report(session.steps, console)
+            raise
+    report(session.steps, console)
 
 
 def check_limits(scenario: Scenario) -> None:
@@ -112,25 +135,54 @@ def listening(
         reception.stop()
 
 
-def wait_for_drivers(reception: Reception, config: HardwareStationConfig, patience: float = PATIENCE) -> None:
-    """Return when both have been heard.
+def wait_for_drivers(
+    reception: Reception,
+    config: HardwareStationConfig,
+    patience: float = PATIENCE,
+    *,
+    ready: bool = False,
+    say: Callable[[str], None] = lambda text: None,
+) -> None:
+    """Return when both have been heard, and, where it must be `ready`, the arm takes commands.
 
-    Raises HardwareError after `patience`, s, and ImageError for pictures of a wrong kind.
+    `say` is told what is waited for. Raises HardwareError after `patience`, s, and ImageError where no picture
+    is of the right kind.
     """
     deadline = time.monotonic() + patience
-    while time.monotonic() < deadline:
-        if reception.status is not None and reception.pictures:
-            message = reception.newest_picture(after=-np.inf)
-            assert message is not None
-            decode_images(message)
-            return
+    while problem := _what_is_missing(reception, config, ready):
+        say(f"waiting: {problem}")
+        if time.monotonic() >= deadline:
+            left_out = "".join(f"; {line}" for line in reception.untold())
+            raise HardwareError(f"{problem} within {patience:g} s at {config.lcm.url}{left_out}")
         time.sleep(0.02)
-    missing = []
+
+
+def _what_is_missing(reception: Reception, config: HardwareStationConfig, ready: bool) -> str:
+    """What keeps a run from beginning; empty if nothing does. Raises ImageError."""
+    silent = []
     if reception.status is None:
-        missing.append(f"{config.lcm.status_channel} (is drake-franka-driver running?)")
+        silent.append(f"{config.lcm.status_channel} (is drake-franka-driver running?)")
     if not reception.pictures:
-        missing.append(f"{config.lcm.image_channel} (is realsense_rgbd_publisher running, with that serial?)")
-    raise HardwareError(f"nothing came on {' nor on '.join(missing)} within {patience:g} s at {config.lcm.url}")
+        silent.append(f"{config.lcm.image_channel} (is realsense_rgbd_publisher running, with that serial?)")
+    if silent:
+        return f"nothing came on {' nor on '.join(silent)}"
+    status = reception.status
+    assert status is not None
+    if ready and reception.clock() - status.time > ENDED:
+        return f"{config.lcm.status_channel} has ended (start drake-franka-driver again), and nothing more came"
+    if ready and status.robot_mode != MOVE:
+        return f"robot_mode is {status.robot_mode} ({_MODES[status.robot_mode]}), and did not change"
+    newest = reception.newest_picture(after=-np.inf)
+    if newest is None:
+        return "no picture came that can be used"
+    sent, message = newest
+    try:
+        as_drake_images(decode_images(message), config.camera)
+    except ImageError as error:
+        reception.skip(sent, error)
+        return "no picture came that can be used"
+    reception.used()
+    return ""
 
 
 class _Session:
@@ -152,15 +204,17 @@ class _Session:
         self._console, self._meshcat = console, meshcat
         self._config = scenario.hardware
         self._progress = Progress()
-        self._steps: list[Step] = []
+        self.steps: list[Step] = []
+        """What is finished so far."""
         self._heard = (0, time.monotonic())
+        self._stopped = False
 
-    def run(self, record: bool) -> list[Step]:
-        """Move the arm."""
+    def run(self, record: bool) -> None:
+        """Move the arm. Raises RunStoppedError if it was stopped for good."""
         kinematics = PandaKinematics(self._config.panda)
         q_observe = self._observation_posture(kinematics)
         with ExitStack() as stack:
-            stack.enter_context(state_of(self._folder, self._progress, self._steps))
+            stack.enter_context(state_of(self._folder, self._progress, self.steps))
             commands = stack.enter_context(
                 CommandProcess(self._config.lcm, self._config.command, self._config.panda)
             )
@@ -171,7 +225,7 @@ class _Session:
                 self._seed,
                 self._meshcat,
                 drivers=Drivers(self._reception, commands, way_back.take),
-                permit=self._operator.permit,
+                permit=self._permit,
             )
             listeners: list[Listener] = []
             if record:
@@ -181,8 +235,19 @@ class _Session:
                 listeners.append(stack.enter_context(recording))
             off_path = self._config.command.safety.off_path
             watch = ArmWatch(wired, commands, self._operator, self._progress, way_back, off_path)
-            self._interact(wired, watch, listeners)
-            self._folder.note(pauses=watch.pauses)
+            try:
+                self._interact(wired, lambda context: watch(context) or self._is_silent(PATIENCE), listeners)
+            finally:
+                self._folder.note(
+                    pauses=watch.pauses,
+                    messages_left_out={"seen": self._reception.left_out, "commanding": commands.left_out},
+                )
+            if self._stopped:
+                raise RunStoppedError(self._progress.end)
+        self._note_gaps(commands)
+
+    def _note_gaps(self, commands: CommandProcess) -> None:
+        """How evenly commands were sent; known once they have ended."""
         if len(commands.send_times) > 1:
             gaps = np.diff(commands.send_times)
             self._folder.note(
@@ -193,15 +258,15 @@ class _Session:
                     "longest": round(1e3 * float(gaps.max()), 3),
                 },
             )
-        return self._steps
 
-    def run_dry(self, unasked: bool, replayed: bool) -> list[Step]:
+    def run_dry(self, unasked: bool, replayed: bool) -> None:
         """Show what would be done from where the arm is, and move nothing."""
         assert self._reception.status is not None
         # Where the arm stands it looks from.
         self._config.start_position = [float(q) for q in self._reception.status.position]
-        showing = DryRun(self._scenario, self._meshcat, None if unasked else self._operator, self._console)
-        with state_of(self._folder, self._progress, self._steps):
+        operator = None if unasked else self._operator
+        showing = DryRun(self._scenario, self._meshcat, operator, self._console, self._progress)
+        with state_of(self._folder, self._progress, self.steps):
             wired = make_diagram(
                 self._scenario,
                 self._seed,
@@ -209,8 +274,9 @@ class _Session:
                 drivers=Drivers(self._reception),
                 permit=(lambda push: Permission.WAIT) if replayed else showing.permit,
             )
-            self._interact(wired, lambda _: replayed and self._is_over(), [])
-        return self._steps
+            self._interact(wired, lambda _: self._is_silent(SILENCE if replayed else PATIENCE), [])
+            if self._stopped and not replayed:
+                raise RunStoppedError(self._progress.end)
 
     def _interact(
         self, wired: WiredDiagram, look: Callable[[Context], bool], listeners: list[Listener]
@@ -218,7 +284,7 @@ class _Session:
         with self._console.status("looking") as status:
             narrator = Narrator(self._console, status)
             listeners = [lambda *_: narrator.follow(self._progress), *listeners]
-            wall = WallClock(time.time(), look)
+            wall = WallClock(self._reception.clock(), lambda context: self._look(look, context))
             for step in interactions(
                 wired,
                 StageClock(),
@@ -229,7 +295,7 @@ class _Session:
                 wall=wall,
             ):
                 self._folder.write_step(step)
-                self._steps.append(step)
+                self.steps.append(step)
                 narrator.tell_step(step)
         narrator.tell_end(self._progress)
 
@@ -252,13 +318,28 @@ class _Session:
         self._operator.confirm(
             f"the arm goes to where it looks from, {turn:.0f} degrees in {motion.end_time():.1f} s"
         )
-        travel(commands, motion)
+        travel(commands, motion, self._reception.clock)
 
-    def _is_over(self) -> bool:
-        """Whether a replayed log has nothing more to say."""
+    def _permit(self, push: Push) -> Permission:
+        said = self._operator.permit(push)
+        if said is Permission.END:
+            self._progress.end = self._operator.why_quit
+        return said
+
+    def _look(self, look: Callable[[Context], bool], context: Context) -> bool:
+        """Whether something from outside has brought the run to its end."""
+        for line in self._reception.untold():
+            self._operator.tell(line)
+        was_over = bool(self._progress.end)  # by the operator's word, say
+        self._stopped = look(context) and not was_over
+        return self._stopped or was_over
+
+    def _is_silent(self, patience: float) -> bool:
+        """Whether the camera has said nothing for `patience`, s."""
         pictures, since = self._heard
         if self._reception.pictures != pictures:
             self._heard = (self._reception.pictures, time.monotonic())
-        elif time.monotonic() - since > SILENCE:
-            self._progress.end = "the log is over"
-        return bool(self._progress.end)
+        elif time.monotonic() - since > patience:
+            self._progress.end = f"no picture has come for {patience:g} s"
+            return True
+        return False

@@ -107,7 +107,7 @@ def interactions(
         if news.phase is ArmPhase.DONE:
             made = wired.interaction_step(context)
             enough = made >= wired.most_interactions
-            progress.end = (
+            progress.end = progress.end or (
                 f"{made} of {made} interactions were made" if enough else "no push is left that could find more"
             )
         elif progress.time >= longest:

@@ -121,11 +121,15 @@ def _objects(number: int) -> str:
     return "1 object" if number == 1 else f"{number} objects"
 
 
+class RunStoppedError(RuntimeError):
+    """A run that did not come to its end; says in one line why."""
+
+
 @contextmanager
 def state_of(folder: RunFolder, progress: Progress, steps: list[Step]) -> Iterator[None]:
     """Enter in the summary how the run ended, also where it was stopped or failed.
 
-    A KeyboardInterrupt is raised again, with what it left.
+    A KeyboardInterrupt is raised again, with what it left; so is any other exception.
     """
     start = perf_counter()
 
@@ -145,6 +149,9 @@ def state_of(folder: RunFolder, progress: Progress, steps: list[Step]) -> Iterat
         finish("interrupted", "stopped by the user")
         finished = f"{len(steps)} finished step{'' if len(steps) == 1 else 's'}"
         raise KeyboardInterrupt(f"{finished} in {folder.path}") from None
+    except RunStoppedError as stop:
+        finish("stopped", str(stop))
+        raise
     except Exception as error:
         finish("failed", " ".join(str(error).split()))
         raise

@@ -48,7 +48,7 @@ class Scenario:
     """Alg. 1: when to look, and how many pushes at most."""
     emulator: EmulatorConfig = field(default_factory=EmulatorConfig)
     """The drivers that `riseg emulate` stands in for, around the station above."""
-    longest: float = 300.0
+    longest: float = field(default=300.0, metadata={"least": 1.0, "most": 86400.0})
     """A run ends after this time even if the arm is not done, simulated seconds."""
 
     @property

@@ -1,13 +1,18 @@
 """Reads a YAML file into a dataclass, and says in one line what would have been right where it is wrong.
 
-pydrake's yaml_load_typed does the filling; the check before it knows lines, near misses and plain words.
+pydrake's yaml_load_typed does the filling; the check before it knows lines, near misses and plain words, and
+the one after it the values. What a field allows stands in its metadata: `choices` (words), `least` and `most`
+(of a number, or of each in a list), `sizes` (of a list). How fields must fit together a dataclass checks
+itself, in `check(self)`, which raises ValueError with a text that begins with a key.
 """
 
 import dataclasses
 import difflib
 import math
+import re
 import types
 import typing
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -24,7 +29,7 @@ class ScenarioError(ValueError):
 def read_scenario(path: Path, schema: type[Schema]) -> Schema:
     """Fill a dataclass from a YAML file; keys that are absent keep their defaults.
 
-    Raises ScenarioError: missing file, no YAML, unknown key, value of the wrong type.
+    Raises ScenarioError: missing file, no YAML, unknown key, value of the wrong type or out of bounds.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -48,9 +53,53 @@ def parse_scenario(text: str, schema: type[Schema], source: str) -> Schema:
         return schema()
     _check(node, schema, name="the scenario", source=source)
     try:
-        return yaml_load_typed(schema=schema, data=text, defaults=schema())
+        loaded = yaml_load_typed(schema=schema, data=text, defaults=schema())
     except (RuntimeError, ValueError, TypeError) as error:
         raise ScenarioError(f"{source}: {' '.join(str(error).split())}") from None
+    for complaint in _complaints(loaded):
+        raise ScenarioError(f"{source}: line {_line(node, complaint)}: {complaint}")
+    return loaded
+
+
+def _complaints(loaded: Any, prefix: str = "") -> Iterator[str]:
+    """What is wrong with the values of a dataclass, inner ones first; each line begins with the key's path."""
+    for field in dataclasses.fields(loaded):
+        value, path = getattr(loaded, field.name), f"{prefix}{field.name}"
+        if dataclasses.is_dataclass(value):
+            yield from _complaints(value, f"{path}.")
+        else:
+            yield from _out_of_bounds(value, field.metadata, path)
+    try:
+        getattr(loaded, "check", lambda: None)()
+    except ValueError as error:
+        yield f"{prefix}{error}"
+
+
+def _out_of_bounds(value: Any, bounds: Mapping[str, Any], path: str) -> Iterator[str]:
+    if "sizes" in bounds and len(value) not in bounds["sizes"]:
+        yield f"{path} has {len(value)} numbers; expected {' or '.join(str(size) for size in bounds['sizes'])}"
+    least, most = bounds.get("least", -math.inf), bounds.get("most", math.inf)
+    for number in value if isinstance(value, list) else [value]:
+        if ("least" in bounds or "most" in bounds) and number is not None and not least <= number <= most:
+            yield f"{path} is {number:g}; expected {_range(least, most)}"
+
+
+def _range(least: float, most: float) -> str:
+    if math.isinf(most):
+        return f"at least {least:g}"
+    return f"at most {most:g}" if math.isinf(least) else f"{least:g} to {most:g}"
+
+
+def _line(node: yaml.Node, complaint: str) -> int:
+    """The line of the key whose path a complaint begins with, or of the innermost block around it."""
+    line = node.start_mark.line
+    for key in re.match(r"[\w.]*", complaint).group().split("."):  # type: ignore[union-attr]
+        entries = node.value if isinstance(node, yaml.MappingNode) else []
+        found = [entry for entry in entries if entry[0].value == key]
+        if not found:
+            break
+        line, node = found[-1][0].start_mark.line, found[-1][1]
+    return line + 1
 
 
 def _check(node: yaml.Node, schema: Any, name: str, source: str) -> None:

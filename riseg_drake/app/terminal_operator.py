@@ -8,6 +8,7 @@ from typing import TextIO
 
 from rich.console import Console
 
+from riseg_drake.app.run import RunStoppedError
 from riseg_drake.pushing.push import Push
 from riseg_drake.systems.arm_motion import Permission
 
@@ -48,6 +49,13 @@ class TerminalOperator:
         self._question = ""
         return said
 
+    @property
+    def why_quit(self) -> str:
+        """What stands behind an answer to quit, for people."""
+        if self._closed:
+            return "nobody can answer: there is no terminal to read from; with --yes nobody is asked"
+        return "the operator ended it"
+
     def permit(self, push: Push) -> Permission:
         """What the operator says to a push."""
         if self._consents:
@@ -61,14 +69,14 @@ class TerminalOperator:
         return {"": Permission.WAIT, "y": Permission.DO, "n": Permission.SKIP}.get(said, Permission.END)
 
     def confirm(self, question: str) -> None:
-        """Wait for a yes. Raises KeyboardInterrupt for anything else."""
+        """Wait for a yes. Raises KeyboardInterrupt for a no, RunStoppedError where nobody can answer."""
         if self._consents:
             self._console.print(question, highlight=False)
             return
         while not (said := self.answer(f"{question}: y to go, q to end", f"y {QUIT}")):
             time.sleep(0.05)
         if said != "y":
-            raise KeyboardInterrupt
+            raise RunStoppedError(self.why_quit) if self._closed else KeyboardInterrupt
 
     def released(self, stop: str) -> bool | None:
         """Whether the arm may move again after a stop; None while there is no answer.

@@ -9,8 +9,8 @@ from pydrake.systems.framework import Context
 
 from riseg_drake.app.interactions import Truth
 from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.stations.arm_messages import array_time
 from riseg_drake.stations.ground_truth import LABEL_CHANNEL, POSE_CHANNEL, decode_labels, decode_poses
-from riseg_drake.stations.lcm_reception import array_time
 
 KEPT = 60
 """Messages kept of each channel: those of some seconds."""

@@ -32,6 +32,11 @@ _CREEP = 1e-3  # rad/s; Ruckig wants some speed, also where a joint has none tow
 _LOOKS = 10  # at the speeds of a stop
 
 
+LEAST_MARGIN, MOST_MARGIN = 0.005, 0.5
+"""Of room to the ends of the joints' ranges, rad: stops go beyond theirs by micrometres, arms follow within
+milliradians; and with more than half a radian joints 4 and 6 would hardly turn."""
+
+
 @dataclass
 class CommandLimits:
     """Shares of the robot's limits that commands may use, more than 0 and at most 1."""
@@ -46,14 +51,26 @@ class CommandLimits:
     """Room that commands keep to the ends of the joints' ranges, rad; less than planned paths do."""
 
     def __post_init__(self) -> None:
+        self.check()
+
+    def check(self) -> None:
+        """Raise ValueError for shares that no robot grants; also called after a scenario was read."""
         for name in ("velocity", "acceleration", "jerk", "stop_acceleration", "stop_jerk"):
             share = getattr(self, name)
             if not 0 < share <= 1:
                 raise ValueError(
-                    f"{name} is a share of the arm's limit, more than 0 and at most 1, not {share}"
+                    f"{name} is {share:g}; expected a share of the arm's limit, more than 0 and at most 1"
                 )
-        if self.stop_acceleration < self.acceleration or self.stop_jerk < self.jerk:
-            raise ValueError("a stop must be allowed at least the acceleration and jerk of other motions")
+        for name in ("acceleration", "jerk"):
+            share, stop = getattr(self, name), getattr(self, f"stop_{name}")
+            if not stop >= share:
+                raise ValueError(
+                    f"stop_{name} is {stop:g}; at least {name}, {share:g}, so that a stop is soon over"
+                )
+        if not LEAST_MARGIN <= self.position_margin <= MOST_MARGIN:
+            raise ValueError(
+                f"position_margin is {self.position_margin:g}; expected {LEAST_MARGIN:g} to {MOST_MARGIN:g} rad"
+            )
 
     def longest_stop(self, robot: RobotLimits) -> float:
         """No stop takes longer than this, s: from full speed, and full acceleration the wrong way."""

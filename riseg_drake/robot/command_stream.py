@@ -8,7 +8,7 @@ nothing is until the operator says so. What is sent first then is where the arm 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,10 +48,12 @@ class CommandParameters:
     playout: PlayoutParameters = field(default_factory=PlayoutParameters)
     safety: SafetyParameters = field(default_factory=SafetyParameters)
 
-    def check(self, robot: RobotLimits) -> None:
-        """Raise ValueError for settings with which a robot could not stop in time."""
+    def check(self, robot: RobotLimits | None = None) -> None:
+        """Raise ValueError for settings that cannot be, or with which a robot could not stop in time."""
         if not 100 <= self.rate <= 1000:
-            raise ValueError(f"rate: {self.rate} commands a second; expected 100 to 1000")
+            raise ValueError(f"rate is {self.rate:g}; expected 100 to 1000 commands a second")
+        if robot is None:
+            return
         longest = self.limits.longest_stop(robot)
         if longest > LONGEST_STOP:
             raise ValueError(
@@ -65,7 +67,7 @@ class ArmStatus:
     """What the arm says."""
 
     time: float
-    """Wall time, s."""
+    """When it was so, s, by the clock of whoever listens."""
     position: NDArray[np.float64]
     """Measured joint angles, rad [7]."""
     velocity: NDArray[np.float64]
@@ -73,13 +75,11 @@ class ArmStatus:
     torque_external: NDArray[np.float64]
     """External torques as the driver gives them, N m [7]; only their size is used."""
     robot_mode: int
+    contradicted: bool = False
+    """Whether others that came with it cannot be of the same arm."""
     gap: float | None = None
     """Largest time between the stamps of two statuses, one after the other, from the one that was handed on
     before this up to this one, s; None where those in between were not seen."""
-
-    def shifted(self, offset: float) -> "ArmStatus":
-        """The same, said `offset` s later."""
-        return replace(self, time=self.time + offset) if offset else self
 
 
 @dataclass(frozen=True)
@@ -100,19 +100,19 @@ class TipGeometry:
 class CommandStream:
     """See above. `state` is what the supervisor thinks; `position` what was commanded last, rad [7]."""
 
-    DRIFT_GAIN = 5.0
+    DRIFT_GAIN = 3.0
     """Velocity mode: the arm's drift is taken back with this rate, 1/s ..."""
     DRIFT_SPEED = 0.01
     """... at most this fast, rad/s, ..."""
     SLOW = 0.1
     """... and only while no joint is faster than this, rad/s: in fast motion lag looks like drift."""
-    DRIFT_NOTICED, DRIFT_LEFT = 3e-4, 1e-4
+    DRIFT_NOTICED, DRIFT_LEFT = 3e-4, 5e-5
     """Drift counts from the one on, until less than the other is left, rad: seven joints together are then
-    within a millimetre at the tip, and noise, of which the filter leaves a sixth, moves nothing."""
-    DRIFT_FILTER = 0.1
+    within a millimetre at the tip, and noise, of which the filter leaves a ninth, moves nothing."""
+    DRIFT_FILTER = 0.2
     """Time constant of the filter of measured drift, s."""
-    LAG = 0.01
-    """How long after a command the arm is there, s: half a period, and the driver's low pass of 30 Hz."""
+    LAG = 0.0053
+    """The driver's low pass of 30 Hz keeps the arm so far behind its commands, s."""
 
     def __init__(self, parameters: CommandParameters, tip: TipGeometry, robot: RobotLimits):
         parameters.check(robot)
@@ -204,7 +204,7 @@ class CommandStream:
     ) -> NDArray[np.float64] | None:
         """The command of one period: joint angles or velocities [7] by mode; None while there is none.
 
-        `now` and `image_time`, that of the newest picture, are in s.
+        `now` and `image_time`, that of the newest picture, are in s by the steady clock of the status.
         """
         before = self.state
         target = self._playout.advance(self.period) if before.may_move else None
@@ -270,6 +270,13 @@ class CommandStream:
             self._limiter = None
         return last
 
+    def brake(self) -> NDArray[np.float64] | None:
+        """The command of one period of coming to rest, whatever is known: nothing is looked at any more."""
+        if self._limiter is None or self._is_silent:
+            return None
+        self._limiter.stop()
+        return self._command()
+
     def _command(self) -> NDArray[np.float64]:
         assert self._limiter is not None
         self._is_silent = False
@@ -294,6 +301,7 @@ class CommandStream:
             tip_force=0.0 if status is None else self._tip.force(measured, status.torque_external),
             p_WE=self._tip.position(rest),
             held_back=limiter is not None and limiter.held_back,
+            contradicted=status is not None and status.contradicted,
             lag=0.0 if limiter is None else _largest(measured - (limiter.position - self._drift)),
             gap=0.0
             if limiter is None or target is None
@@ -319,7 +327,9 @@ class CommandStream:
         if _largest(speed) > self.SLOW:
             self._drift_seen = np.zeros(7)
             return
-        told = self._limiter.position - self._drift - (now - self._status.time + self.LAG) * speed
+        # A velocity holds from its command to the next: half a period on the mean, of the one that has passed.
+        behind = now - self._status.time + self.LAG - self.period / 2
+        told = self._limiter.position - self._drift - behind * speed
         share = self.period / (self.period + self.DRIFT_FILTER)
         was_noticed = self._drift_taken_back
         self._drift_seen = self._drift_seen + share * (told - self._status.position - self._drift_seen)

@@ -1,5 +1,6 @@
 """Which arm, with which tool: from model files into a MultibodyPlant."""
 
+import math
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
@@ -29,11 +30,18 @@ class PandaDescription:
     """A model with a link `pusher`, to be bolted to the flange, and the frames `tip` and `camera`."""
     drake_models: str = ""
     """Folder of an offline copy of the package drake_models; empty: Drake's own, which it downloads."""
-    tool_yaw: float = 0.0
+    tool_yaw: float = field(default=0.0, metadata={"least": -6.2832, "most": 6.2832})
     """Angle about the flange's z axis from the flange (panda_link8) to the tip frame E, rad."""
-    X_EC: list[float] = field(default_factory=list)
+    X_EC: list[float] = field(default_factory=list, metadata={"sizes": (0, 6)})
     """The camera on the tool as calibrated: x, y, z in m, roll, pitch, yaw in rad; empty: as the pusher's
     model has it."""
+
+    def check(self) -> None:
+        """Raise ValueError for a camera that is nowhere on the tool."""
+        if any(abs(length) > 1 for length in self.X_EC[:3]):
+            raise ValueError(f"X_EC is {self.X_EC}; x, y, z are metres from the tip, at most 1")
+        if any(abs(angle) > 2 * math.pi for angle in self.X_EC[3:]):
+            raise ValueError(f"X_EC is {self.X_EC}; roll, pitch, yaw are radians, at most 2 pi")
 
     @property
     def limits(self) -> RobotLimits:

@@ -1,5 +1,6 @@
 """What the joints of each robot can do."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,6 +73,16 @@ class RobotLimits:
         downwards = self.slowing_down.speed(q - self.position_lower)
         upwards = self.slowing_down.speed(self.position_upper - q)
         return -np.minimum(downwards, self.velocity), np.minimum(upwards, self.velocity)
+
+
+def check_start_position(start_position: Sequence[float], limits: RobotLimits, margin: float = 0.0) -> None:
+    """Raise ValueError where joint angles [7], rad, keep no `margin` to the ends; empty ones are none."""
+    for index, q in enumerate(start_position):
+        lower, upper = limits.position_lower[index] + margin, limits.position_upper[index] - margin
+        if not lower <= q <= upper:
+            raise ValueError(
+                f"start_position is {q:g} for joint {index + 1}; expected {lower:g} to {upper:g} rad"
+            )
 
 
 PANDA_LIMITS = RobotLimits(

@@ -10,6 +10,7 @@ trajectory has got to, and the trajectory makes up for it in one step. After a l
 rest at the last command: the trajectory begins there again, at rest.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,16 +51,31 @@ class PacedCommands:
     def next(
         self, steady: float, wall: float, status: ArmStatus | None, image_time: float | None
     ) -> StampedCommand | None:
-        """The command that is due now, by both clocks, s; None while there is none."""
+        """The command that is due now, by both clocks, s; None while there is none.
+
+        Status and pictures tell their time by the steady clock.
+        """
         if steady - self._followed > LONGEST_PAUSE:
             self._begin_at_rest(status)
             self._due = steady
+        return self._due_now(steady, wall, lambda: self._stream.step(steady, status, image_time))
+
+    def brake(self, steady: float, wall: float) -> StampedCommand | None:
+        """The same for an arm that must come to rest, whatever is known of it, by the stop kept ready."""
+        if steady - self._followed > LONGEST_PAUSE and self._last is not None:
+            self._stream.begin_at_rest(self._last)
+            self._due = steady
+        return self._due_now(steady, wall, self._stream.brake)
+
+    def _due_now(
+        self, steady: float, wall: float, step: Callable[[], NDArray[np.float64] | None]
+    ) -> StampedCommand | None:
         periods = 1 + max(int((steady - self._due) / self._period), 0)
         planned = self._due + (periods - 1) * self._period
         stamp = wall - (steady - planned)
         for _ in range(periods):
-            values = self._stream.step(wall, status, image_time)
-        self._due = planned + self._period
+            values = step()
+            self._due += self._period  # one by one: what fails half way is gone on with from there
         if values is None:
             self._followed, self._last = planned, None
             return None

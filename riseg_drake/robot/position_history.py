@@ -7,7 +7,11 @@ from numpy.typing import NDArray
 
 
 class PositionHistory:
-    """Joint angles and velocities by time, for the last `span` s, in whatever order they come in."""
+    """Joint angles and velocities by time, in whatever order they come in.
+
+    What lies more than `span` s, and up to twice that, from the one that came last is forgotten, before it and
+    after: a time that was wrong is gone as soon as the next one has come.
+    """
 
     def __init__(self, span: float = 5.0):
         self._span = span
@@ -22,8 +26,9 @@ class PositionHistory:
         self._times.insert(place, time)
         self._states.insert(place, np.concatenate([position, velocity]))
         if self._times[-1] - self._times[0] > 2 * self._span:  # now and then, many at a time
-            old = bisect_right(self._times, self._times[-1] - self._span)
-            del self._times[:old], self._states[:old]
+            old = bisect_right(self._times, time - self._span)
+            ahead = bisect_right(self._times, time + self._span)
+            self._times, self._states = self._times[old:ahead], self._states[old:ahead]
 
     @property
     def newest(self) -> float:

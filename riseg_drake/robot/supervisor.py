@@ -27,29 +27,42 @@ MOVE, REFLEX, USER_STOPPED = 2, 4, 5
 class SafetyParameters:
     """What makes the arm stop."""
 
-    status_age: float = 0.1
-    """Oldest status in motion and at rest, s."""
-    status_gap: float = 0.1
+    status_age: float = field(default=0.1, metadata={"least": 0.02, "most": 0.3})
+    """Oldest status in motion and at rest, s. So long may it move unseen: no longer than a stop may take."""
+    status_gap: float = field(default=0.1, metadata={"least": 0.03, "most": 0.4})
     """Largest time between the stamps of two statuses, one after the other, of a driver that was there all
     along, s; see above."""
-    image_age: float = 0.5
+    image_age: float = field(default=0.5, metadata={"least": 0.1, "most": 5.0})
     """Oldest picture while the arm moves, s; age counts from the picture's own time stamp."""
-    contact_force: float = 15.0
-    """Largest external force at the tip where no contact is planned, N."""
-    push_force: float = 30.0
+    contact_force: float = field(default=15.0, metadata={"least": 1.0, "most": 100.0})
+    """Largest external force at the tip where no contact is planned, N; above 100 the robot stops by itself."""
+    push_force: float = field(default=30.0, metadata={"least": 1.0, "most": 100.0})
     """Largest external force at the tip during a push, N."""
-    workspace_lower: list[float] = field(default_factory=lambda: [0.15, -0.6, 0.0])
+    workspace_lower: list[float] = field(
+        default_factory=lambda: [0.15, -0.6, 0.0], metadata={"sizes": (3,), "least": -2.0, "most": 2.0}
+    )
     """Least coordinates of the tip in W, m, 3; z = 0 is the table."""
-    workspace_upper: list[float] = field(default_factory=lambda: [0.85, 0.6, 0.9])
-    """Largest coordinates of the tip in W, m, 3."""
-    largest_gap: float = 0.1
+    workspace_upper: list[float] = field(
+        default_factory=lambda: [0.85, 0.6, 0.9], metadata={"sizes": (3,), "least": -2.0, "most": 2.0}
+    )
+    """Largest coordinates of the tip in W, m, 3; no arm reaches as far as 2 m."""
+    largest_gap: float = field(default=0.1, metadata={"least": 0.01, "most": 0.3})
     """The arm may be this far from where it is told to be, and its targets from there, rad."""
-    fresh_for: float = 0.3
+    fresh_for: float = field(default=0.3, metadata={"least": 0.05, "most": 10.0})
     """A pause ends when nothing has been too old for this long, s; by then the arm is at rest."""
-    displacement: float = 0.01
+    displacement: float = field(default=0.01, metadata={"least": 0.001, "most": 0.1})
     """After a pause the arm must be this near to where it is told to be, rad; contact makes less."""
-    off_path: float = 0.02
+    off_path: float = field(default=0.02, metadata={"least": 0.001, "most": 0.1})
     """A path is gone on with where the arm is this near to it, rad."""
+
+    def check(self) -> None:
+        """Raise ValueError for bounds that contradict each other."""
+        lower, upper = self.workspace_lower, self.workspace_upper
+        if not all(a < b for a, b in zip(lower, upper, strict=True)):
+            raise ValueError(f"workspace_lower is {lower}; each less than in workspace_upper, {upper} m")
+        if not self.contact_force <= self.push_force:
+            force, most = self.contact_force, self.push_force
+            raise ValueError(f"contact_force is {force:g}; at most push_force, {most:g} N")
 
 
 class Mode(Enum):
@@ -82,6 +95,8 @@ class Cause(Enum):
     FORCE = "something pushes against the arm where no contact was planned"
     NOT_FOLLOWING = "the arm is not where it was told to be"
     GAP = "the motion asked for begins somewhere else"
+    CONTRADICTION = "the arm's status contradicts itself, as if two drivers sent it"
+    FAULT = "the process that sends commands failed"
     INTERRUPT = "Ctrl-C"
     FINISHED = "the program is done"
     CLIENT_GONE = "the program that plans the motion is gone"
@@ -92,7 +107,7 @@ class Observation:
     """All that is looked at, at one moment."""
 
     now: float
-    """Wall time, s."""
+    """By a steady clock, as are the times below, s."""
     status_time: float | None
     """Of the newest status, s; None before the first."""
     status_gap: float
@@ -114,6 +129,8 @@ class Observation:
     """Largest difference of measured from commanded joint angles, rad; 0 before the first command."""
     gap: float
     """Largest difference of the next target from the last command, rad."""
+    contradicted: bool = False
+    """Whether what comes as the arm's status cannot all be of one arm."""
 
 
 @dataclass(frozen=True)
@@ -144,6 +161,8 @@ def supervise(state: SafetyState, seen: Observation, parameters: SafetyParameter
         if seen.status_time is None:
             return state
         refusal = lost if lost is not Cause.NONE else Cause.STATUS_OLD if old else Cause.NONE
+        if refusal is Cause.NONE and seen.contradicted:
+            refusal = Cause.CONTRADICTION
         return SafetyState(Mode.FOLLOWING) if refusal is Cause.NONE else SafetyState(Mode.STOPPED, refusal)
     if lost is not Cause.NONE:
         return SafetyState(Mode.STOPPED, lost)
@@ -194,6 +213,8 @@ def _loss(seen: Observation, parameters: SafetyParameters) -> Cause:
 
 def _danger(seen: Observation, parameters: SafetyParameters) -> Cause:
     """What must not go on unless a person has looked at it."""
+    if seen.contradicted:
+        return Cause.CONTRADICTION
     allowed = parameters.push_force if seen.contact_planned else parameters.contact_force
     if not seen.tip_force <= allowed:
         return Cause.FORCE

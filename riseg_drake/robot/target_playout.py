@@ -8,7 +8,7 @@ late then, but never off its path, and nothing ever jumps.
 
 from bisect import bisect_right
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +20,12 @@ from riseg_drake.robot.command_limiter import Target
 class PlayoutParameters:
     """How late targets are played out, and how the clock behaves."""
 
-    delay: float = 0.6
+    delay: float = field(default=0.6, metadata={"least": 0.05, "most": 5.0})
     """Targets are played out this long after the time they were meant for, s; silence up to about half of it
     goes unnoticed."""
-    slope: float = 2.0
+    slope: float = field(default=2.0, metadata={"least": 0.1, "most": 20.0})
     """The clock's rate changes by at most this much a second, 1/s: from full speed to standstill in 0.5 s."""
-    longest: float = 120.0
+    longest: float = field(default=120.0, metadata={"least": 1.0, "most": 3600.0})
     """So much motion may wait at most, s; when the arm is further behind, new targets are refused."""
 
 
@@ -72,6 +72,7 @@ class TargetPlayout:
             raise ValueError(f"a target for {time} s comes after one for {self._times[-1]} s")
         elif self._last_change - self.time > self._parameters.longest:
             raise ValueError(f"targets of more than {self._parameters.longest} s are waiting")
+        self._skip_rest()
         position = np.asarray(position, np.float64)
         if self._positions and not np.array_equal(position, self._positions[-1]):
             self._last_change = time
@@ -89,8 +90,7 @@ class TargetPlayout:
         change = self._parameters.slope * period
         self.rate = float(np.clip(min(wanted, 1.0), self.rate - change, self.rate + change))
         self.time = min(self.time + self.rate * period, self._times[-1])
-        if not self.in_motion:  # at rest nothing is lost, or seen, by going to where the clock should be
-            self.time = max(self._last_change, self._times[-1] - self._parameters.delay)
+        self._skip_rest()
         self._forget()
         return self._at(self.time)
 
@@ -122,6 +122,11 @@ class TargetPlayout:
         distances = np.abs(positions - position).max(axis=1)
         nearest = int(np.argmin(distances))
         return float(distances[nearest]), times[nearest]
+
+    def _skip_rest(self) -> None:
+        """Where nothing moves go to where the clock should be: nothing is lost by it, or seen."""
+        if self.time is not None and self._times and not self.in_motion:
+            self.time = max(self._last_change, self._times[-1] - self._parameters.delay)
 
     def _forget(self) -> None:
         """Drop what neither interpolation nor the way back to the path needs any more."""

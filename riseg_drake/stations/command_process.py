@@ -10,79 +10,45 @@ that they are meant for; if the pipe breaks, or Ctrl-C comes, it brings the arm 
 import multiprocessing
 import select
 import signal
+import sys
 import threading
 import time
 from collections import deque
 from contextlib import suppress
-from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
-from drake import lcmt_panda_command, lcmt_panda_status
 from numpy.typing import NDArray
+from pydrake.lcm import DrakeLcm
 
-from riseg_drake.robot.command_stream import (
-    VELOCITY,
-    ArmStatus,
-    CommandParameters,
-    CommandStream,
-    TipGeometry,
-)
+from riseg_drake.robot.command_stream import CommandParameters, CommandStream, TipGeometry
 from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import PandaKinematics
-from riseg_drake.robot.paced_commands import PacedCommands
-from riseg_drake.robot.supervisor import Cause, Mode, SafetyState
+from riseg_drake.robot.supervisor import Cause
+from riseg_drake.stations.command_session import CommandSession, StreamReport, command_message
+from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm
-from riseg_drake.stations.lcm_reception import array_time, status_of
 from riseg_drake.stations.promptness import be_prompt
 
-FINAL_COMMANDS = 20
-"""How many commands at rest end the stream: zeros, in velocity mode."""
+READY = "ready"
+"""The first word of the process."""
+LONGEST_START = 60.0
+"""It must be said within this time, s."""
 REPORT_EVERY = 4
 """A report every so many periods."""
 PRIORITY = 20
 """Among real-time processes, where the system allows that."""
 MOST_MESSAGES = 200
 """Read from the pipe in one period at most; the rest waits for the next."""
+MOST_FAILURES = 400
+"""Rounds in which nothing could be sent or heard; then there is no way to bring the arm to rest."""
+LISTEN_EVERY = 1e-3
+"""Time between two looks for messages while most of them are left out, s."""
 
 
 class CommandError(RuntimeError):
     """The arm cannot be commanded; says in one line why."""
-
-
-@dataclass(frozen=True)
-class StreamReport:
-    """How the stream is doing."""
-
-    state: SafetyState
-    position: NDArray[np.float64] | None
-    """The last command, rad [7]; None while none is sent."""
-    status: ArmStatus | None
-    behind: float
-    """How much motion is still to be played out, s."""
-    done_until: float
-    """Targets up to this time have been gone through, s; minus infinity before the first."""
-    at_rest: bool
-    off_path: float = 0.0
-    """How far the arm is from its path, rad."""
-    words: int = 0
-    """How many words of the operator this report knows of."""
-    refused: str = ""
-    """Why targets were not taken, if they were not."""
-
-
-def command_message(command: NDArray, mode: str, stamp: float) -> lcmt_panda_command:
-    """What the driver accepts: `command` [7] in the fields of its mode, stamped, s, and nothing else."""
-    message = lcmt_panda_command()
-    message.utime = int(stamp * 1e6)
-    if mode == VELOCITY:
-        message.control_mode_expected = lcmt_panda_status.CONTROL_MODE_VELOCITY
-        message.num_joint_velocity, message.joint_velocity = 7, [float(v) for v in command]
-    else:
-        message.control_mode_expected = lcmt_panda_status.CONTROL_MODE_POSITION
-        message.num_joint_position, message.joint_position = 7, [float(q) for q in command]
-    return message
 
 
 class CommandProcess:
@@ -104,10 +70,14 @@ class CommandProcess:
         self._process = spawn.Process(
             target=stream_commands, args=(theirs, lcm, parameters, panda), name="riseg commands", daemon=True
         )
-        self._process.start()
+        # Ctrl-C while the other process imports is for later: it ends because this one does.
+        held = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
+        try:
+            self._process.start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, held)
         theirs.close()
-        if not self._connection.poll(60) or self._receive() != "ready":
-            raise CommandError("the process that sends commands did not start")
+        self._await_start()
 
     def __enter__(self) -> "CommandProcess":
         return self
@@ -116,7 +86,7 @@ class CommandProcess:
         self.close()
 
     def send_target(self, time: float, position: NDArray) -> None:
-        """Joint angles [7], rad, to be at about the wall time `time`, s; later than all sent before."""
+        """Joint angles [7], rad, for a time, s, by any even clock; later than all sent before."""
         self._send("target", time, np.array(position))
 
     def expect_contact(self, start: float, end: float) -> None:
@@ -144,7 +114,7 @@ class CommandProcess:
 
     @property
     def report(self) -> StreamReport | None:
-        """The newest report; None before the first. Raises CommandError if the process has died."""
+        """The newest report; None before the first. Raises CommandError if the process has failed or died."""
         with self._lock:
             try:
                 while self._connection.poll(0):
@@ -154,7 +124,15 @@ class CommandProcess:
                     raise CommandError(
                         "the process that sends commands died; the arm holds or stops by itself"
                     ) from None
-        return self._report
+            report = self._report
+        if report is not None and report.failed:
+            raise CommandError(f"{Cause.FAULT.value}, and brought the arm to rest: {report.failed}")
+        return report
+
+    @property
+    def left_out(self) -> dict[str, int]:
+        """How many messages were not let in so far, by channel and kind."""
+        return {} if self._report is None else self._report.left_out
 
     def close(self, patience: float = 3.0) -> None:
         """Bring the arm to rest and end the process, within `patience`, s, or by force."""
@@ -168,6 +146,18 @@ class CommandProcess:
         self._process.join(max(deadline - time.monotonic(), 0.1))
         if self._process.is_alive():
             self._process.terminate()
+
+    def _await_start(self) -> None:
+        """Raises CommandError, with the reason, if the process does not get ready."""
+        try:
+            came = self._connection.poll(LONGEST_START)
+            said = self._receive() if came else f"it said nothing in {LONGEST_START:g} s"
+        except (EOFError, OSError):
+            self._process.join(1.0)
+            said = f"it ended with exit code {self._process.exitcode}"
+        if said != READY:
+            self._process.terminate()
+            raise CommandError(f"the process that sends commands did not start: {said}")
 
     def _send(self, *message: Any) -> None:
         with self._lock:
@@ -186,113 +176,100 @@ class CommandProcess:
             self.send_times = message
 
 
-class _News:
-    """The newest of what the drivers publish; decoded when asked for."""
-
-    def __init__(self, config: LcmConfig):
-        self.lcm = open_lcm(config)
-        self._status_data: bytes | None = None
-        self._status: ArmStatus | None = None
-        self.image_time: float | None = None
-        self.lcm.Subscribe(config.status_channel, self._take_status)
-        self.lcm.Subscribe(config.image_channel, self._take_images)
-
-    def _take_status(self, data: bytes) -> None:
-        self._status_data = data
-
-    def _take_images(self, data: bytes) -> None:
-        self.image_time = array_time(data)
-
-    def read(self) -> ArmStatus | None:
-        """Take in what has come; returns the arm's newest status."""
-        self.lcm.HandleSubscriptions(0)
-        if self._status_data is not None:
-            status = status_of(lcmt_panda_status.decode(self._status_data))
-            self._status_data = None
-            if self._status is None or status.time > self._status.time:  # on the way some overtake others
-                self._status = status
-        return self._status
-
-
 def stream_commands(
     connection: Connection, lcm: LcmConfig, parameters: CommandParameters, panda: PandaDescription
 ) -> None:
-    """What the process does, until it is told to end, interrupted, or left alone; the arm is at rest then."""
+    """What the process does, until it is told to end, interrupted, or left alone; the arm is at rest then.
+
+    Whatever goes wrong on the way, the arm is brought to rest first, and the process ends with exit code 1.
+    """
     interrupted = threading.Event()
-    signal.signal(signal.SIGINT, lambda *_: interrupted.set())
-    signal.signal(signal.SIGTERM, lambda *_: interrupted.set())
-    kinematics = PandaKinematics(panda)
-    tip = TipGeometry(lambda q: kinematics.X_WE(q)[:3, 3], kinematics.tip_jacobian)
-    stream = CommandStream(parameters, tip, panda.limits)
-    news = _News(lcm)
+    for end in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(end, lambda *_: interrupted.set())
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT, signal.SIGTERM))
+    try:
+        clock = EvenClock()
+        session, network = _begin(lcm, parameters, panda, clock())
+    except Exception as error:
+        with suppress(OSError):
+            connection.send(f"{type(error).__name__}: {' '.join(str(error).split())}")
+        sys.exit(1)
     be_prompt(PRIORITY)
-    connection.send("ready")
+    connection.send(READY)
     sent: deque[float] = deque(maxlen=1_000_000)
-    refused, rounds, final = "", 0, 0
-    paced = PacedCommands(stream, time.monotonic())
-    while final < FINAL_COMMANDS:
-        refused = _obey(connection, stream) or refused
+    rounds, failures = 0, 0
+    while not session.is_over and failures < MOST_FAILURES:
         if interrupted.is_set():
-            stream.end(Cause.INTERRUPT)
-        status = news.read()
-        command = paced.next(time.monotonic(), time.time(), status, news.image_time)
-        if command is not None and command.is_in_time(time.monotonic()):
-            message = command_message(command.values, parameters.mode, command.stamp)
-            news.lcm.Publish(lcm.command_channel, message.encode())
-            paced.was_sent(command)
-            sent.append(time.monotonic())
-        if stream.state.mode is Mode.ENDED and stream.at_rest:
-            final = final + 1 if command is not None else FINAL_COMMANDS
+            session.end(Cause.INTERRUPT)
+        _obey(connection, session)
+        _listen(network, session)
+        try:
+            now = clock()
+            command = session.next(now, now - clock.shift())
+            if command is not None and command.is_in_time(clock()):
+                message = command_message(command.values, parameters.mode, command.stamp)
+                network.Publish(lcm.command_channel, message.encode())
+                session.was_sent(command)
+                sent.append(time.monotonic())
+        except Exception as error:  # of the network; a session sees to its own
+            session.fail(error)
+            failures += 1
         rounds += 1
         if rounds % REPORT_EVERY == 0:
-            _tell(connection, _report(stream, status, refused))
-        time.sleep(paced.wait(time.monotonic()))
+            _tell(connection, session.report())
+        _wait(session, network, clock)
     with suppress(OSError):
-        connection.send(_report(stream, news.read(), refused))
+        connection.send(session.report())
         connection.send(np.array(sent))
         connection.close()
+    if session.failed:
+        sys.exit(1)
 
 
-def _obey(connection: Connection, stream: CommandStream) -> str:
-    """Do what the pipe says; returns why a target was refused, or an empty text."""
-    refused = ""
+def _begin(
+    config: LcmConfig, parameters: CommandParameters, panda: PandaDescription, now: float
+) -> tuple[CommandSession, DrakeLcm]:
+    """A session that hears the drivers."""
+    kinematics = PandaKinematics(panda)
+    tip = TipGeometry(lambda q: kinematics.X_WE(q)[:3, 3], kinematics.tip_jacobian)
+    network = open_lcm(config)
+    stream = CommandStream(parameters, tip, panda.limits)
+    session = CommandSession(stream, now, config.status_channel, config.image_channel)
+    network.Subscribe(config.status_channel, session.hear_status)
+    network.Subscribe(config.image_channel, session.hear_picture)
+    return session, network
+
+
+def _obey(connection: Connection, session: CommandSession) -> None:
+    """Do what the pipe says."""
     try:
         for _ in range(MOST_MESSAGES):
             if not connection.poll(0):
                 break
-            word, *values = connection.recv()
-            match word:
-                case "target":
-                    stream.add_target(*values)
-                case "contact":
-                    stream.expect_contact(*values)
-                case "release":
-                    stream.release()
-                case "abandon":
-                    stream.abandon_path()
-                case "begin":
-                    stream.begin_path()
-                case "end":
-                    stream.end(Cause.FINISHED)
-    except ValueError as error:
-        refused = str(error)
+            session.obey(*connection.recv())
     except (EOFError, OSError):
-        stream.end(Cause.CLIENT_GONE)
-    return refused
+        session.end(Cause.CLIENT_GONE)
+    except Exception as error:  # what cannot be unpacked
+        session.fail(error)
 
 
-def _report(stream: CommandStream, status: ArmStatus | None, refused: str) -> StreamReport:
-    return StreamReport(
-        state=stream.state,
-        position=stream.position,
-        status=status,
-        behind=stream.behind,
-        done_until=stream.done_until,
-        at_rest=stream.at_rest,
-        off_path=stream.off_path if stream.state.mode is Mode.STOPPED else 0.0,
-        words=stream.words,
-        refused=refused,
-    )
+def _listen(network: DrakeLcm, session: CommandSession) -> None:
+    try:
+        network.HandleSubscriptions(0)
+    except Exception as error:
+        session.fail(error)
+
+
+def _wait(session: CommandSession, network: DrakeLcm, clock: EvenClock) -> None:
+    """Until the next command is due.
+
+    LCM keeps one message of each channel until it is asked: among many that are left out the good ones come
+    through if it is asked more often.
+    """
+    while session.is_flooded and session.wait(clock()) > LISTEN_EVERY:
+        time.sleep(LISTEN_EVERY)
+        _listen(network, session)
+    time.sleep(session.wait(clock()))
 
 
 def _tell(connection: Connection, report: StreamReport) -> None:

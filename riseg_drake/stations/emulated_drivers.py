@@ -27,7 +27,7 @@ class EmulatorConfig:
     """Network and channels."""
     driver: PandaDriverConfig = field(default_factory=PandaDriverConfig)
     """The arm's driver."""
-    rate: float = 10.0
+    rate: float = field(default=10.0, metadata={"least": 0.1, "most": 120.0})
     """Pictures a second at most; fewer come where drawing takes longer."""
     software_depth_registration: bool = True
     """The camera driver's flag of that name: whether aligned depth is published."""

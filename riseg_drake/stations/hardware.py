@@ -5,8 +5,6 @@ was when it was taken. So whoever pairs the two cannot do it wrong, however late
 know where the arm is now, which is the process that sends commands, listens to the arm itself.
 """
 
-import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol
 
@@ -31,10 +29,15 @@ from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.robot.command_stream import CommandParameters
 from riseg_drake.robot.description import PandaDescription, add_panda
+from riseg_drake.robot.limits import check_start_position
+from riseg_drake.stations.arm_messages import AHEAD
 from riseg_drake.stations.lcm_channels import LcmConfig
 from riseg_drake.stations.lcm_images import ImageError, LcmImages, decode_images
 from riseg_drake.stations.lcm_reception import Reception
+from riseg_drake.stations.wrist_camera import check_camera
 
+LONGEST_EXPOSURE = 1.0
+"""A picture is sent at most this long after it was taken, s."""
 TARGET_PERIOD = 0.01
 """Time between two targets for the arm, s; the process that sends commands puts a cubic between them."""
 
@@ -43,28 +46,34 @@ TARGET_PERIOD = 0.01
 class HardwareCameraConfig:
     """The RealSense camera, as its driver was started."""
 
-    width: int = 640
+    width: int = field(default=640, metadata={"least": 0, "most": 16384})
     """Columns used, from the middle of the picture; 0: all of them. px"""
-    fx: float = 616.285
+    fx: float = field(default=616.285, metadata={"least": 10, "most": 100000.0})
     """Of the whole picture, as the driver calibrates it; px."""
-    fy: float = 615.778
+    fy: float = field(default=615.778, metadata={"least": 10, "most": 100000.0})
     """px"""
     cx: float = 405.418
     """px; a picture of which only the middle is used need not be thought of."""
     cy: float = 232.864
     """px"""
-    full_width: int = 848
+    full_width: int = field(default=848, metadata={"least": 16, "most": 16384})
     """Size of the pictures that the driver sends, px."""
-    full_height: int = 480
+    full_height: int = field(default=480, metadata={"least": 16, "most": 16384})
     """px"""
-    rate: float = 15.0
+    rate: float = field(default=15.0, metadata={"least": 0.5, "most": 120})
     """Pictures looked at in a second, at most; fewer where the computer is busy."""
-    latency: float = 0.0
+    latency: float = field(default=0.0, metadata={"least": 0.0, "most": 1.0})
     """A picture shows where the arm was this long before the picture's stamp, s."""
-    depth_min: float = 0.3
+    depth_min: float = field(default=0.3, metadata={"least": 0.0, "most": 20.0})
     """Nearest depth that is believed, m."""
-    depth_max: float = 3.0
+    depth_max: float = field(default=3.0, metadata={"least": 0.0, "most": 20.0})
     """Farthest depth that is believed, m."""
+
+    def check(self) -> None:
+        """Raise ValueError for a camera that cannot be."""
+        check_camera(self.cx, self.cy, self.full_width, self.full_height, self.depth_min, self.depth_max)
+        if self.width > self.full_width:
+            raise ValueError(f"width is {self.width}; at most full_width, {self.full_width} px")
 
     @property
     def first_column(self) -> int:
@@ -86,29 +95,40 @@ class HardwareStationConfig:
     camera: HardwareCameraConfig = field(default_factory=HardwareCameraConfig)
     lcm: LcmConfig = field(default_factory=LcmConfig)
     command: CommandParameters = field(default_factory=CommandParameters)
-    centre_W: list[float] = field(default_factory=lambda: [0.5, 0.0])
+    centre_W: list[float] = field(
+        default_factory=lambda: [0.5, 0.0], metadata={"sizes": (2,), "least": -1.5, "most": 1.5}
+    )
     """Middle of the work area on the table, x and y in W, m; the camera looks down at it between pushes."""
-    observe_height: float = 0.5
+    observe_height: float = field(default=0.5, metadata={"least": 0.1, "most": 1.5})
     """Height of the camera above it then, m."""
-    start_position: list[float] = field(default_factory=list)
+    start_position: list[float] = field(default_factory=list, metadata={"sizes": (0, 7)})
     """Joint angles to look from instead, rad, 7; empty: as the two lines above say."""
+
+    def check(self) -> None:
+        """Raise ValueError for what this robot cannot do."""
+        limits = self.panda.limits
+        try:
+            self.command.check(limits)
+        except ValueError as error:
+            raise ValueError(f"command.{error}") from None
+        check_start_position(self.start_position, limits, self.command.limits.position_margin)
 
 
 class TargetSink(Protocol):
     """Who moves the arm."""
 
     def send_target(self, time: float, position: NDArray) -> None:
-        """Joint angles [7], rad, to be at about the wall time `time`, s."""
+        """Joint angles [7], rad, to be at about the time `time`, s, by a clock that goes on evenly."""
 
     def done_until(self) -> float:
         """Up to what time, s, targets have been gone through: the arm may be late."""
 
 
 class HardwareStation(Diagram):
-    """Behind its ports are the drivers. The context's time must be wall time.
+    """Behind its ports are the drivers. The context's time must be that of the reception's clock.
 
-    Without `sink` nothing is moved: what comes in at `panda.position` is ignored. `clock` gives wall time, s.
-    Raises ImageError when a picture comes that the camera's driver, as it was started, cannot give.
+    Without `sink` nothing is moved: what comes in at `panda.position` is ignored. Raises ImageError when
+    no picture comes any more that can be used.
     """
 
     def __init__(
@@ -116,12 +136,11 @@ class HardwareStation(Diagram):
         config: HardwareStationConfig,
         reception: Reception,
         sink: TargetSink | None = None,
-        clock: Callable[[], float] = time.time,
         meshcat: Meshcat | None = None,
     ):
         super().__init__()
         builder = DiagramBuilder()
-        view = builder.AddSystem(LcmView(config.camera, reception, clock))
+        view = builder.AddSystem(LcmView(config.camera, reception))
         targets = builder.AddSystem(Targets(sink))
         builder.ExportInput(targets.get_input_port(), "panda.position")
         for name, port in LcmView.PORTS.items():
@@ -173,7 +192,7 @@ class Sight:
     time: float
     """When it was taken, s."""
     sent: float
-    """The message's own stamp, s, which tells whether another is newer."""
+    """When the message was sent, s, which tells whether another is newer."""
     position: NDArray[np.float64]
     """rad [7]"""
     velocity: NDArray[np.float64]
@@ -186,18 +205,28 @@ class Sight:
 def newest_sight(reception: Reception, config: HardwareCameraConfig, after: float) -> Sight | None:
     """The newest picture sent later than `after`, s; None where there is none, or its arm is not known yet.
 
-    Raises ImageError for a picture that the camera's driver, as the scenario has it, cannot give.
+    A picture that cannot be used is left out. Raises ImageError, of the last of them, when there are no others
+    for a while: the camera is blind, or is not the one that the scenario has.
     """
-    message = reception.newest_picture(after)
-    if message is None:
+    newest = reception.newest_picture(after)
+    if newest is None:
         return None
-    images = decode_images(message)
-    taken = images.time + reception.offset
+    sent, message = newest
+    try:
+        images = decode_images(message)
+        taken = sent + (images.time - message.header.utime * 1e-6)
+        if not sent - LONGEST_EXPOSURE <= taken <= sent + AHEAD:
+            raise ImageError(
+                f"colour is stamped {abs(taken - sent):.3f} s {'after' if taken > sent else 'before'} its "
+                "message; the camera's driver must stamp by the computer's clock (global time enabled)"
+            )
+        color, depth = as_drake_images(images, config)
+    except ImageError as error:
+        reception.skip(sent, error)
+        return None
+    reception.used()
     arm = reception.state_at(taken - config.latency)
-    if arm is None:
-        return None
-    color, depth = as_drake_images(images, config)
-    return Sight(color, depth, taken, message.header.utime * 1e-6 + reception.offset, *arm)
+    return None if arm is None else Sight(color, depth, taken, sent, *arm)
 
 
 class LcmView(LeafSystem):
@@ -216,10 +245,10 @@ class LcmView(LeafSystem):
     }
     """By their names at the station."""
 
-    def __init__(self, config: HardwareCameraConfig, reception: Reception, clock: Callable[[], float]):
+    def __init__(self, config: HardwareCameraConfig, reception: Reception):
         super().__init__()
         self.set_name("drivers")
-        self._config, self._reception, self._clock = config, reception, clock
+        self._config, self._reception = config, reception
         nothing = Sight(ImageRgba8U(), ImageDepth32F(), -1.0, -np.inf, np.zeros(7), np.zeros(7))
         self._state = self.DeclareAbstractState(Value[object](nothing))
         ticket = {self.abstract_state_ticket(self._state)}
@@ -254,7 +283,7 @@ class LcmView(LeafSystem):
 
     def _look(self, context: Context, state: State) -> EventStatus:
         shown = self._shown(context)
-        if self._clock() - context.get_time() > 1 / self._config.rate:
+        if self._reception.clock() - context.get_time() > 1 / self._config.rate:
             return EventStatus.DidNothing()
         sight = newest_sight(self._reception, self._config, after=shown.sent)
         if sight is None or sight.time <= shown.time:

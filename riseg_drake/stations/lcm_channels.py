@@ -8,6 +8,9 @@ from pydrake.lcm import DrakeLcm
 RECEIVE_LIMIT = Path("/proc/sys/net/core/rmem_max")
 """Where Linux says how large a receive buffer a program may ask for, bytes."""
 
+LONGEST_NAME = 38
+"""Of a channel or serial number, letters: LCM takes 63, and an image channel's begins with 25 of its own."""
+
 _KINDS = ("udpm", "tcpq", "file", "memq")
 
 
@@ -22,6 +25,15 @@ class LcmConfig:
     command_channel: str = "PANDA_COMMAND"
     camera_serial: str = "emulated"
     """Serial number of the camera; `realsense_rgbd_publisher --dump_camera_ids` prints it."""
+
+    def check(self) -> None:
+        """Raise ValueError for names that LCM does not take."""
+        for name in ("status_channel", "command_channel", "camera_serial"):
+            said = getattr(self, name)
+            if not 0 < len(said) <= LONGEST_NAME or not said.isprintable():
+                raise ValueError(f"{name} is {said[:80]!r}; expected 1 to {LONGEST_NAME} letters")
+        if (said := self.status_channel) == self.command_channel:
+            raise ValueError(f"command_channel is {said!r}, as status_channel is; expected another")
 
     @property
     def image_channel(self) -> str:

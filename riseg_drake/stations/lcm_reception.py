@@ -1,18 +1,18 @@
 """What arm and camera say on LCM, kept until somebody asks: every status, and the last few pictures."""
 
-import struct
 import threading
-import time
 from collections import deque
-from collections.abc import Callable
 
 import numpy as np
-from drake import lcmt_image_array, lcmt_panda_status
+from drake import lcmt_image_array
 from pydrake.lcm import DrakeLcmInterface
 
 from riseg_drake.robot.command_stream import ArmStatus
 from riseg_drake.robot.position_history import PositionHistory
+from riseg_drake.stations.arm_messages import AHEAD, PictureDoor, StatusDoor
+from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.lcm_channels import LcmConfig
+from riseg_drake.stations.lcm_images import ImageError
 
 POLL = 0.01
 """Time between two looks for messages, s. Waiting inside LCM would keep Python's lock, and looking more often
@@ -22,31 +22,18 @@ KEPT_PICTURES = 4
 """Undecoded pictures kept, half a megabyte each."""
 
 
-def status_of(message: lcmt_panda_status) -> ArmStatus:
-    """The part of the driver's status that this program depends on."""
-    return ArmStatus(
-        time=message.utime * 1e-6,
-        position=np.array(message.joint_position),
-        velocity=np.array(message.joint_velocity),
-        torque_external=np.array(message.joint_torque_external),
-        robot_mode=message.robot_mode,
-    )
-
-
-def array_time(data: bytes) -> float:
-    """The stamp of an encoded lcmt_image_array, s, without decoding its pictures.
-
-    It follows LCM's fingerprint of 8 bytes and the sequence number of 4.
-    """
-    (utime,) = struct.unpack_from(">q", data, 12)
-    return utime * 1e-6
+REPLAYED_AHEAD = 1.0
+"""So far may stamps of a log be ahead of now, s: its first message may have been late by as much."""
+BLIND = 2.0
+"""The camera is blind when for this time, s, ..."""
+BLIND_PICTURES = 3
+"""... and so many in a row no picture could be used."""
 
 
 class Reception:
     """Listens to a connection, in a thread of its own between `start` and `stop`, or when `listen` is called.
 
-    `offset` is added to every stamp, s: 0 for drivers that are there now. With `replayed`, it becomes the
-    time that has passed since a log was recorded, by the first status.
+    All times are by `clock`, which goes on evenly. With `replayed`, the first status of a log is of now.
     """
 
     def __init__(
@@ -54,29 +41,45 @@ class Reception:
         lcm: DrakeLcmInterface,
         config: LcmConfig,
         replayed: bool = False,
-        clock: Callable[[], float] = time.time,
+        clock: EvenClock | None = None,
     ):
         self._lcm = lcm
-        self._clock = clock
+        self.clock = clock or EvenClock()
+        """What tells the time here, s."""
         self._lock = threading.Lock()
         self._history = PositionHistory()
-        self._pictures: deque[bytes] = deque(maxlen=KEPT_PICTURES)
-        self._offset: float | None = None if replayed else 0.0
+        self._pictures: deque[tuple[float, bytes]] = deque(maxlen=KEPT_PICTURES)
+        self._replayed = replayed
+        self._log_shift: float | None = None
+        ahead = REPLAYED_AHEAD if replayed else AHEAD
+        self._status_door = StatusDoor(config.status_channel, ahead)
+        self._picture_door = PictureDoor(config.image_channel, ahead)
+        self._unusable, self._last_usable = 0, -np.inf
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self.status: ArmStatus | None = None
         """The newest; None before the first."""
         self.statuses = 0
-        """How many have come."""
+        """How many have been let in."""
         self.pictures = 0
-        """How many have come."""
+        """How many have been let in."""
         lcm.Subscribe(config.status_channel, self._take_status)
         lcm.Subscribe(config.image_channel, self._take_picture)
 
     @property
     def offset(self) -> float:
-        """What is added to the senders' stamps, s."""
-        return self._offset or 0.0
+        """What is added to the senders' stamps, s: 0 for drivers that are there now, until a clock is set."""
+        return (self._log_shift or 0.0) if self._replayed else self.clock.shift()
+
+    @property
+    def left_out(self) -> dict[str, int]:
+        """How many messages were not let in or not used so far, by channel and kind."""
+        doors = (self._status_door.refused, self._picture_door.refused)
+        return {f"{door.channel}: {kind}": n for door in doors for kind, n in dict(door.counts).items()}
+
+    def untold(self) -> list[str]:
+        """A line for each kind of message that was left out for the first time since the last call."""
+        return [*self._status_door.refused.untold(), *self._picture_door.refused.untold()]
 
     def start(self) -> None:
         """Listen from now on."""
@@ -99,30 +102,67 @@ class Reception:
         with self._lock:
             return self._history.at(time)
 
-    def newest_picture(self, after: float) -> lcmt_image_array | None:
-        """The newest message sent later than `after`, s by its own stamp with the offset."""
-        candidates = [data for data in tuple(self._pictures) if array_time(data) + self.offset > after]
-        return lcmt_image_array.decode(max(candidates, key=array_time)) if candidates else None
+    def newest_picture(self, after: float) -> tuple[float, lcmt_image_array] | None:
+        """The newest message sent later than `after`, s, behind the time at which it was sent.
+
+        One that is cut off is left out; see `skip`, also for errors.
+        """
+        with self._lock:
+            pictures = sorted(self._pictures, key=lambda picture: picture[0], reverse=True)
+        for sent, data in pictures:
+            if sent <= after:
+                break
+            try:
+                return sent, lcmt_image_array.decode(data)
+            except Exception as error:  # whatever the decoder makes of it
+                self.skip(sent, ImageError(f"a picture message that is cut off or damaged ({error})"))
+        return None
+
+    def skip(self, sent: float, error: ImageError) -> None:
+        """Leave out a picture, by the time at which it was sent, s, that cannot be used because of an error.
+
+        Raises that error when the camera is blind: when nothing else has come for a while.
+        """
+        now = self.clock()
+        with self._lock:
+            kept = [picture for picture in self._pictures if picture[0] != sent]
+            self._pictures.clear()
+            self._pictures.extend(kept)
+        self._picture_door.refused.add("a picture that cannot be used", str(error))
+        if not self._unusable:
+            self._last_usable = now
+        self._unusable += 1
+        if self._unusable >= BLIND_PICTURES and now - self._last_usable >= BLIND:
+            raise error
+
+    def used(self) -> None:
+        """A picture was good: the camera is not blind."""
+        self._unusable = 0
 
     def _run(self) -> None:
         while not self._stopping.wait(POLL):
             self.listen()
 
     def _take_status(self, data: bytes) -> None:  # LCM calls this from C: nothing may be raised
-        try:
-            status = status_of(lcmt_panda_status.decode(data))
-        except Exception:  # whatever the decoder makes of bytes that are no status; the arm says more soon
+        now = self.clock()
+        if self._replayed and self._log_shift is None:
+            message = self._status_door.opened(data)
+            if message is None:
+                return
+            self._log_shift = now - 1e-6 * message.utime
+        status = self._status_door.admit(data, now, self.offset)
+        if status is None:
             return
-        if self._offset is None:
-            self._offset = self._clock() - status.time
-        status = status.shifted(self._offset)
         with self._lock:
             self._history.add(status.time, status.position, status.velocity)
-        if self.status is None or status.time > self.status.time:
-            self.status = status
+        self.status = status
         self.statuses += 1
 
     def _take_picture(self, data: bytes) -> None:
-        if self._offset is not None and len(data) > 24:
-            self._pictures.append(data)
+        if self._replayed and self._log_shift is None:
+            return
+        sent = self._picture_door.admit(data, self.clock(), self.offset)
+        if sent is not None:
+            with self._lock:
+                self._pictures.append((sent, data))
             self.pictures += 1

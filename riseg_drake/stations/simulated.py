@@ -43,6 +43,7 @@ from riseg_drake.robot.description import (
     register_models,
 )
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture
+from riseg_drake.robot.limits import check_start_position
 from riseg_drake.stations.scene import (
     PlacedObject,
     SceneConfig,
@@ -95,10 +96,14 @@ class SimulatedStationConfig:
     """Proportional gain of every joint's controller, N m / rad."""
     damping: float = 200.0
     """Derivative gain of every joint's controller, N m s / rad."""
-    start_position: list[float] = field(default_factory=list)
+    start_position: list[float] = field(default_factory=list, metadata={"sizes": (0, 7)})
     """Joint angles at the start, rad, 7; empty: looking straight down at the middle of the work area."""
     observe_height: float = 0.5
     """Height of the camera above the table at the start, m; unused where start_position is given."""
+
+    def check(self) -> None:
+        """Raise ValueError for joint angles that the robot does not have."""
+        check_start_position(self.start_position, self.panda.limits)
 
 
 @dataclass(frozen=True)

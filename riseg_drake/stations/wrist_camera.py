@@ -17,30 +17,43 @@ from riseg_drake.stations.sensor_noise import SensorNoise, noisy_color, noisy_de
 class CameraConfig:
     """A D415's colour camera, 848x480 cropped to its central 640x480, with depth aligned to it."""
 
-    width: int = 640
+    width: int = field(default=640, metadata={"least": 16, "most": 16384})
     """px"""
-    height: int = 480
+    height: int = field(default=480, metadata={"least": 16, "most": 16384})
     """px"""
-    fx: float = 616.285
+    fx: float = field(default=616.285, metadata={"least": 10, "most": 100000.0})
     """px"""
-    fy: float = 615.778
+    fy: float = field(default=615.778, metadata={"least": 10, "most": 100000.0})
     """px"""
     cx: float = 301.418
     """px"""
     cy: float = 232.864
     """px"""
-    rate: float = 15.0
+    rate: float = field(default=15.0, metadata={"least": 0.5, "most": 120})
     """Pictures a second."""
-    depth_min: float = 0.3
+    depth_min: float = field(default=0.3, metadata={"least": 0.0, "most": 20.0})
     """Nearest depth that is measured, m."""
-    depth_max: float = 3.0
+    depth_max: float = field(default=3.0, metadata={"least": 0.0, "most": 20.0})
     """Farthest depth that is measured, m."""
     noise: SensorNoise = field(default_factory=SensorNoise)
+
+    def check(self) -> None:
+        """Raise ValueError for a camera that cannot be."""
+        check_camera(self.cx, self.cy, self.width, self.height, self.depth_min, self.depth_max)
 
     @property
     def intrinsics(self) -> Intrinsics:
         """The pinhole."""
         return Intrinsics(self.width, self.height, self.fx, self.fy, self.cx, self.cy)
+
+
+def check_camera(cx: float, cy: float, width: int, height: int, depth_min: float, depth_max: float) -> None:
+    """Raise ValueError where the principal point, px, is not in the picture, or no depth, m, is believed."""
+    for name, centre, size in (("cx", cx, width), ("cy", cy, height)):
+        if not 0 <= centre < size:
+            raise ValueError(f"{name} is {centre:g}; expected a pixel of the picture, 0 to {size - 1}")
+    if not depth_min < depth_max:
+        raise ValueError(f"depth_min is {depth_min:g}; less than depth_max, {depth_max:g} m")
 
 
 def measured_images(

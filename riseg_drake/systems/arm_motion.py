@@ -31,7 +31,7 @@ class Permission(Enum):
 class ArmMotionParameters:
     """When to look, and when to stop."""
 
-    most_interactions: int = 5
+    most_interactions: int = field(default=5, metadata={"least": 0, "most": 1000})
     """Pushes of one run (paper: up to 5)."""
     settle_time: float = 0.25
     """A push is chosen in a frame taken this long after the arm came to rest, s."""

@@ -6,6 +6,7 @@ from rich.console import Console
 
 from riseg_drake.app import dry_run
 from riseg_drake.app.dry_run import DryRun
+from riseg_drake.app.interactions import Progress
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.robot.kinematics import READY, PandaKinematics
 from riseg_drake.systems.arm_motion import Permission
@@ -26,6 +27,7 @@ class Person:
 
     def __init__(self, *answers):
         self.answers = list(answers)
+        self.why_quit = "the operator ended it"
 
     def answer(self, question, choices):
         return self.answers.pop(0)
@@ -42,7 +44,8 @@ def push(turn=0.2):
 def made(*answers):
     scenario, out, browser = load_scenario(None, HARDWARE), io.StringIO(), Browser()
     person = Person(*answers) if answers else None
-    return DryRun(scenario, browser, person, Console(file=out, width=200)), browser, out, scenario
+    progress = Progress()
+    return DryRun(scenario, browser, person, Console(file=out, width=200), progress), browser, out, scenario
 
 
 def test_every_push_is_drawn_once_and_none_is_done():

@@ -1,10 +1,10 @@
 import numpy as np
 from pydrake.lcm import DrakeLcm
 
-from riseg_drake.app import hand_eye
 from riseg_drake.app.hand_eye import _Collector, _postures
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.robot.kinematics import READY, PandaKinematics
+from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.ideal_arm import status_message
 from riseg_drake.stations.lcm_images import encode_images
 from riseg_drake.stations.lcm_reception import Reception
@@ -12,15 +12,16 @@ from riseg_drake.stations.lcm_reception import Reception
 START = 1_790_000_000.0
 
 
-def test_every_picture_is_kept_once_with_the_cameras_pose_of_its_own_time(monkeypatch):
-    monkeypatch.setattr(hand_eye.time, "time", lambda: START)
+def test_every_picture_is_kept_once_with_the_cameras_pose_of_its_own_time():
+    now = START
     config = load_scenario(None, HARDWARE).hardware
     config.camera.latency = 0.04
     kinematics, lcm = PandaKinematics(config.panda), DrakeLcm("memq://")
-    reception = Reception(lcm, config.lcm)
+    reception = Reception(lcm, config.lcm, clock=EvenClock(lambda: now, lambda: now))
     collector = _Collector(reception, config.camera, kinematics)
-    for time in np.arange(START, START + 0.5, 0.01):
-        lcm.Publish(config.lcm.status_channel, status_message(time, READY + (time - START)).encode())
+    for now in np.arange(START, START + 0.5, 0.01):
+        lcm.Publish(config.lcm.status_channel, status_message(now, READY + (now - START)).encode())
+        reception.listen()
     color, depth = np.full((480, 848, 3), 90, np.uint8), np.full((480, 848), 0.5, np.float32)
     for taken in (START + 0.2, START + 0.3):
         message = encode_images(color, depth, taken, taken + 0.03, 0)

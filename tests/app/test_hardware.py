@@ -3,17 +3,19 @@ import pytest
 from pydrake.lcm import DrakeLcm
 from pydrake.math import RigidTransform
 
-from riseg_drake.app.arm_travel import TravelError, straight_motion
+from riseg_drake.app.arm_travel import TravelError, WayBack, straight_motion
 from riseg_drake.app.cli import main
 from riseg_drake.app.diagram import make_diagram
 from riseg_drake.app.hardware import HardwareError, check_limits, wait_for_drivers
+from riseg_drake.app.planned_speed import planned_limits, push_parameters
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.stream_bench import is_even
 from riseg_drake.app.truth_reception import TruthReception
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pushing.time_law import SpeedLimits
-from riseg_drake.robot.kinematics import READY, PandaKinematics
+from riseg_drake.robot.kinematics import READY, PandaKinematics, observation_posture, tip_pointing_down
+from riseg_drake.robot.limits import PANDA_LIMITS
 from riseg_drake.stations.ground_truth import LABEL_CHANNEL, POSE_CHANNEL, encode_labels, encode_poses
 from riseg_drake.stations.lcm_reception import Reception
 
@@ -35,6 +37,30 @@ def test_paths_faster_than_commands_may_be_are_refused():
     scenario.push.path.limits.velocity = 0.9
     with pytest.raises(ScenarioError, match=r"push\.path\.limits\.velocity is 0\.9"):
         check_limits(scenario)
+
+
+@pytest.mark.parametrize("robot", ["panda", "fr3"])
+def test_with_every_key_left_out_no_default_contradicts_another(robot, tmp_path):
+    file = tmp_path / "robot.yaml"
+    url = "udpm://239.255.76.67:7667?ttl=0"
+    file.write_text(f'station: !HardwareStationConfig {{panda: {{robot: {robot}}}, lcm: {{url: "{url}"}}}}\n')
+    scenario = load_scenario(file)
+    check_limits(scenario)
+    command, planned = scenario.hardware.command.limits, planned_limits(scenario)
+    for name in ("velocity", "acceleration", "jerk"):
+        assert getattr(planned, name) < getattr(command, name)
+
+
+def test_planned_motions_are_as_much_slower_as_commands_are_and_as_fast_as_a_scenario_says():
+    scenario = load_scenario(None, HARDWARE)
+    usual = planned_limits(scenario)
+    scenario.hardware.command.limits.velocity /= 2
+    scenario.push.path.limits.jerk = 0.05
+    slow = planned_limits(scenario)
+    assert slow.velocity == pytest.approx(usual.velocity / 2)
+    assert slow.acceleration == usual.acceleration
+    assert slow.jerk == push_parameters(scenario).path.limits.jerk == 0.05
+    assert planned_limits(load_scenario(None)) == SpeedLimits()  # in simulation
 
 
 def test_commands_too_fast_to_stop_are_refused():
@@ -67,6 +93,53 @@ def test_drivers_that_are_not_there_are_named():
     reception = Reception(DrakeLcm("memq://"), config.lcm)
     with pytest.raises(HardwareError, match=r"PANDA_STATUS.*nor on DRAKE_RGBD_CAMERA_IMAGES_emulated"):
         wait_for_drivers(reception, config, patience=0.0)
+
+
+class Commands:
+    """Remembers when a new path began."""
+
+    begun = 0
+
+    def begin_path(self):
+        self.begun += 1
+
+
+@pytest.fixture(scope="module")
+def at_desk():
+    """Kinematics, and a posture to look from."""
+    kinematics, config = PandaKinematics(), load_scenario(None, HARDWARE).hardware
+    return kinematics, observation_posture(kinematics, config.centre_W, config.observe_height)
+
+
+def test_the_way_back_begins_where_the_arm_is_goes_up_first_and_is_free(at_desk):
+    kinematics, q_observe = at_desk
+    commands = Commands()
+    way_back = WayBack(kinematics, q_observe, SpeedLimits(0.28, 0.24, 0.1), commands)
+    low = kinematics.solve_ik(tip_pointing_down([0.6, 0.15, 0.02], 0.3), q_observe)
+    seconds = way_back.plan(low)
+    assert commands.begun == 0
+    motion = way_back.take()
+    assert motion.end_time() == seconds
+    assert commands.begun == 1
+    assert way_back.take() is None
+    assert commands.begun == 1
+    assert motion.value(0)[:, 0] == pytest.approx(low)
+    assert motion.value(seconds)[:, 0] == pytest.approx(q_observe)
+    tips = np.array([kinematics.X_WE(motion.value(t)[:, 0])[:3, 3] for t in np.linspace(0, seconds, 200)])
+    below = (tips[:, 2] < WayBack.ABOVE - 0.01) & (np.arange(200) < tips[:, 2].argmax())
+    np.testing.assert_allclose(tips[below][:, :2], np.tile([0.6, 0.15], (below.sum(), 1)), atol=2e-3)
+    assert (np.diff(tips[below][:, 2]) > -1e-6).all()
+    velocity = motion.MakeDerivative().vector_values(np.linspace(0, seconds, 500))
+    assert (np.abs(velocity) <= 0.285 * PANDA_LIMITS.velocity[:, None]).all()
+
+
+def test_where_there_is_no_free_way_back_somebody_has_to_guide_the_arm(at_desk, monkeypatch):
+    kinematics, q_observe = at_desk
+    way_back = WayBack(kinematics, q_observe, SpeedLimits(), Commands())
+    monkeypatch.setattr(kinematics, "clearance", lambda q: 0.0)  # it touches something everywhere
+    with pytest.raises(TravelError, match="guide the arm by hand"):
+        way_back.plan(q_observe + 0.2)
+    assert way_back.take() is None
 
 
 def test_the_arm_does_not_travel_through_the_table():

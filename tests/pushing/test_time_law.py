@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest, steady_speed
-from riseg_drake.robot.limits import PANDA_LIMITS
+from riseg_drake.robot.limits import FR3_LIMITS, PANDA_LIMITS
 
 FROM = np.array([0.0, -0.5, 0.0, -2.5, 0.0, 2.0, 0.0])
 TO = np.array([0.8, 0.2, -0.3, -1.9, 0.4, 2.2, 2.1])
@@ -63,3 +63,16 @@ def test_motion_takes_at_least_the_time_asked_for():
     assert rest_to_rest(
         np.array([FROM, TO]), minimum_jerk, SpeedLimits(), PANDA_LIMITS, shortest=9.0
     ).end_time() == pytest.approx(9.0)
+
+
+def test_towards_the_end_of_an_fr3s_range_a_motion_keeps_to_the_speed_that_it_may_have_there():
+    near = FR3_LIMITS.position_upper - np.array([1.5, 0.05, 1.5, 1.5, 1.5, 1.5, 1.5])
+    far = near - np.array([0, 0.8, 0, 0, 0, 0, 0])
+    limits = SpeedLimits(velocity=0.3, acceleration=0.5, jerk=0.5)
+    way = np.linspace(far, near, 20)
+    there, back = (rest_to_rest(way[::step], minimum_jerk, limits, FR3_LIMITS) for step in (1, -1))
+    time = np.linspace(0, there.end_time(), 2000)
+    highest = FR3_LIMITS.velocity_range(there.vector_values(time).T)[1]
+    use = (there.MakeDerivative().vector_values(time).T / highest)[:, 1].max()
+    assert 0.28 < use <= 0.3 * 1.01
+    assert back.end_time() < 0.9 * there.end_time()  # away from the end all of the speed may be had

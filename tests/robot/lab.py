@@ -13,7 +13,7 @@ PERIOD, TICK = 0.005, 0.001
 EXPIRY = 0.1
 """The driver follows no command that is older, s."""
 LOW_PASS = TICK / (TICK + 1 / (2 * np.pi * 30))
-"""What a tick lets through of the difference to a commanded position: the driver's filter of 30 Hz."""
+"""What a tick lets through of the difference to a command: the driver's filter of 30 Hz."""
 FASTEST = 2.175
 """An arm that is told to be elsewhere goes there this fast, rad/s."""
 
@@ -29,7 +29,7 @@ class Lab:
         self.image_time = self.now
         self.shows = True
         self.q, self.robot_mode, self.is_alive = READY.copy(), MOVE, True
-        self.torque = np.zeros(7)
+        self.v, self.torque = np.zeros(7), np.zeros(7)
         self.status, self.last_stamp = None, None  # the newest that was heard
         self.late_until, self.late_gap = -np.inf, None
         self.command = (-np.inf, None)
@@ -68,7 +68,8 @@ class Lab:
         if self.robot_mode != MOVE or values is None:
             return
         if self.mode == "velocity":
-            self.q = self.q + TICK * values * (self.now - stamp <= EXPIRY)
+            self.v = self.v + LOW_PASS * (values * (self.now - stamp <= EXPIRY) - self.v)
+            self.q = self.q + TICK * self.v
         else:  # held for ever
             self.q = self.q + np.clip(LOW_PASS * (values - self.q), -FASTEST * TICK, FASTEST * TICK)
 
@@ -90,6 +91,7 @@ class Lab:
 
     def start_anew(self):
         self.is_alive, self.robot_mode, self.command = True, MOVE, (-np.inf, None)
+        self.v = np.zeros(7)
 
     def forget(self):
         """What was sent, measured and done so far."""

@@ -1,10 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest
+from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest, steady_speed
 from riseg_drake.robot.command_limiter import CommandLimiter, CommandLimits, Target
 from riseg_drake.robot.kinematics import READY
-from riseg_drake.robot.limits import PANDA_LIMITS
+from riseg_drake.robot.limits import FR3_LIMITS, PANDA_LIMITS
 
 PERIOD = 0.005
 
@@ -57,13 +59,14 @@ def test_a_step_becomes_a_motion_within_limits_that_arrives():
     assert jerk <= limits.jerk + 1e-4
 
 
-def test_a_target_beyond_a_joint_is_not_followed_out_of_its_range():
-    limiter = CommandLimiter(READY, PANDA_LIMITS)
-    beyond = PANDA_LIMITS.position_upper + 1
+@pytest.mark.parametrize("robot", [PANDA_LIMITS, FR3_LIMITS], ids=["panda", "fr3"])
+def test_a_target_beyond_a_joint_is_not_followed_out_of_its_range(robot):
+    limiter = CommandLimiter(robot.position_upper - 0.3, robot)
+    beyond = robot.position_upper + 1
     for _ in range(1500):
         limiter.follow(still(beyond))
         assert limiter.held_back
-    room = PANDA_LIMITS.room(limiter.position)
+    room = robot.room(limiter.position)
     assert room.min() >= CommandLimits().position_margin - 1e-6
     assert limiter.at_rest
 
@@ -90,12 +93,13 @@ def test_a_target_that_races_towards_the_end_of_a_range_is_given_up_in_time():
     assert held_back
 
 
-def test_the_longest_stop_is_no_longer_than_said():
+@pytest.mark.parametrize("robot", [PANDA_LIMITS, FR3_LIMITS], ids=["panda", "fr3"])
+def test_the_longest_stop_is_no_longer_than_said(robot):
     limits = CommandLimits()
     longest = 0
     for seed in range(40):
         rng = np.random.default_rng(seed)
-        limiter = CommandLimiter(READY, PANDA_LIMITS, PERIOD, limits)
+        limiter = CommandLimiter(READY, robot, PERIOD, limits)
         goal = READY + rng.choice([-0.5, 0.5], 7)
         for _ in range(rng.integers(1, 120)):
             limiter.follow(still(goal))
@@ -104,8 +108,32 @@ def test_the_longest_stop_is_no_longer_than_said():
             limiter.stop()
             periods += 1
         longest = max(longest, periods)
-    assert longest * PERIOD <= limits.longest_stop(PANDA_LIMITS) + PERIOD
+    assert longest * PERIOD <= limits.longest_stop(robot) + PERIOD
     assert longest * PERIOD > 0.05  # the test has seen real stops
+
+
+def speed_towards_an_end(robot, end):
+    """Largest share of what an FR3 may have, where all joints are to go to one end at full speed."""
+    start = FR3_LIMITS.position_middle
+    goal = start + end * ((FR3_LIMITS.position_upper - FR3_LIMITS.position_lower) / 2 - 0.04)
+    seconds = np.abs(goal - start).max() / (0.34 * 0.8 * FR3_LIMITS.velocity.min())
+    limiter, positions = CommandLimiter(start, robot), [start]
+    for t in np.arange(0, 1.5, PERIOD / seconds):
+        s, ds, dds = (rate * (goal - start) for rate in steady_speed(0.2)(np.array(min(t, 1.0)))[:3])
+        limiter.follow(Target(start + s, ds / seconds, dds / seconds**2))
+        assert not limiter.held_back
+        positions.append(limiter.position)
+    lowest, highest = FR3_LIMITS.velocity_range(np.array(positions)[:-1])
+    return (end * np.diff(positions, axis=0) / PERIOD / np.where(end > 0, highest, -lowest)).max(), limiter
+
+
+@pytest.mark.parametrize("end", [-1, 1])
+def test_towards_the_end_of_an_fr3s_range_joints_are_no_faster_than_they_may_be_there(end):
+    share, limiter = speed_towards_an_end(FR3_LIMITS, end)
+    assert share <= CommandLimits().velocity * (1 + 1e-6)
+    assert FR3_LIMITS.room(limiter.position).min() < 0.15  # it went there
+    heedless, _ = speed_towards_an_end(replace(FR3_LIMITS, slowing_down=None), end)
+    assert heedless > 1.2 * CommandLimits().velocity
 
 
 @pytest.mark.parametrize(

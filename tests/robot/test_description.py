@@ -3,7 +3,8 @@ import pytest
 from pydrake.multibody.plant import MultibodyPlant
 
 from riseg_drake.robot.description import JOINT_NAMES, PandaDescription, add_panda
-from riseg_drake.robot.limits import PANDA_LIMITS
+from riseg_drake.robot.kinematics import LIMIT_MARGIN, READY, PandaKinematics
+from riseg_drake.robot.limits import FR3_LIMITS, PANDA_LIMITS, ROBOTS
 
 OFFICIAL_URL = "package://drake_models/franka_description/urdf/panda_arm.urdf"
 
@@ -115,3 +116,22 @@ def test_a_calibrated_camera_is_where_the_calibration_says():
 def test_half_a_calibration_is_refused():
     with pytest.raises(ValueError, match="expected 6"):
         plant_of(PandaDescription(X_EC=[0.1, 0.0, 0.0]))
+
+
+@pytest.mark.parametrize("name", ["panda", "fr3"])
+def test_the_joints_have_the_limits_of_the_robot_that_is_named(name):
+    kinematics = PandaKinematics(PandaDescription(robot=name))
+    plant, limits = kinematics.plant, ROBOTS[name]
+    assert kinematics.limits is limits
+    np.testing.assert_array_equal(plant.GetPositionLowerLimits(), limits.position_lower)
+    np.testing.assert_array_equal(plant.GetPositionUpperLimits(), limits.position_upper)
+    np.testing.assert_array_equal(plant.GetVelocityUpperLimits(), limits.velocity)
+    np.testing.assert_array_equal(plant.GetAccelerationUpperLimits(), limits.acceleration)
+
+
+def test_postures_of_an_fr3_keep_to_its_own_ranges():
+    X_WE = PandaKinematics().X_WE(READY)
+    panda, fr3 = (PandaKinematics(PandaDescription(robot=name)) for name in ("panda", "fr3"))
+    assert (FR3_LIMITS.room(fr3.postures(X_WE)) >= LIMIT_MARGIN).all()
+    assert not (FR3_LIMITS.room(panda.postures(X_WE)) >= LIMIT_MARGIN).all()
+    assert fr3.solve_ik(X_WE) is not None

@@ -24,8 +24,8 @@ class Client:
         self.measured = READY
 
     def next(self, t):
-        status = ArmStatus(WALL + t, self.measured, np.zeros(7), np.zeros(7), MOVE, gap=0.001)
-        return self.paced.next(STEADY + t, WALL + t, status, WALL + t)
+        status = ArmStatus(STEADY + t, self.measured, np.zeros(7), np.zeros(7), MOVE, gap=0.001)
+        return self.paced.next(STEADY + t, WALL + t, status, STEADY + t)
 
     def send(self, t):
         command = self.next(t)

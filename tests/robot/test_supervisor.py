@@ -46,9 +46,19 @@ def test_nothing_moves_before_the_arm_has_told_where_it_is():
     assert after(state).may_move
 
 
-def test_nothing_moves_while_the_arm_is_not_ready_or_its_first_status_is_old():
-    assert not after(SafetyState(), robot_mode=1).may_move
-    assert not after(SafetyState(), status_time=9.0).may_move
+@pytest.mark.parametrize(
+    ("seen", "cause"),
+    [
+        ({"robot_mode": 1}, Cause.NOT_READY),
+        ({"robot_mode": USER_STOPPED}, Cause.USER_STOP),
+        ({"status_time": 9.0}, Cause.STATUS_OLD),
+    ],
+)
+def test_an_arm_that_is_not_ready_at_first_needs_the_operators_word_when_it_is(seen, cause):
+    state = after(SafetyState(), **seen)
+    assert state == SafetyState(Mode.STOPPED, cause)
+    assert not after(state).may_move
+    assert after(released(state)).may_move
 
 
 def test_all_is_well_goes_on():
@@ -59,12 +69,24 @@ LATCHED = [
     ({"robot_mode": REFLEX}, Cause.REFLEX),
     ({"robot_mode": USER_STOPPED}, Cause.USER_STOP),
     ({"robot_mode": 1}, Cause.NOT_READY),
+    ({"status_gap": 0.11}, Cause.STATUS_ENDED),
+    ({"status_gap": np.inf}, Cause.STATUS_ENDED),
     ({"tip_force": 15.1}, Cause.FORCE),
     ({"held_back": True}, Cause.JOINT_LIMIT),
     ({"p_WE": np.array([0.5, 0.0, -0.001])}, Cause.WORKSPACE),
     ({"p_WE": np.array([0.5, 0.7, 0.1])}, Cause.WORKSPACE),
     ({"lag": 0.11}, Cause.NOT_FOLLOWING),
     ({"gap": 0.11}, Cause.GAP),
+]
+NO_NUMBER = [
+    ({"tip_force": np.nan}, Cause.FORCE),
+    ({"p_WE": np.array([0.5, np.nan, 0.1])}, Cause.WORKSPACE),
+    ({"lag": np.nan}, Cause.NOT_FOLLOWING),
+    ({"gap": np.nan}, Cause.GAP),
+    ({"status_gap": np.nan}, Cause.STATUS_ENDED),
+    ({"status_time": np.nan}, Cause.STATUS_OLD),
+    ({"image_time": np.nan}, Cause.IMAGES_OLD),
+    ({"now": np.nan}, Cause.STATUS_OLD),
 ]
 
 
@@ -76,6 +98,36 @@ def test_a_stop_holds_until_the_operator_says_otherwise(seen, cause):
         state = after(state)  # all is well again
     assert state.mode is Mode.STOPPED
     assert after(released(state)).may_move
+
+
+@pytest.mark.parametrize(("seen", "cause"), NO_NUMBER)
+def test_what_is_no_number_is_a_danger(seen, cause):
+    state = after(**seen)
+    assert not state.may_move
+    assert state.cause is cause
+
+
+@pytest.mark.parametrize("news", ["status_time", "image_time"])
+def test_news_of_a_time_to_come_is_no_news(news):
+    assert not after(**{news: 20.0}).may_move
+
+
+def test_what_an_old_status_said_is_no_danger_but_a_pause():
+    state = after(status_time=9.0, tip_force=50.0, lag=0.5)
+    assert state == SafetyState(Mode.PAUSED, Cause.STATUS_OLD)
+
+
+@pytest.mark.parametrize("state", [FOLLOWING, SafetyState(Mode.PAUSED, Cause.STATUS_OLD)])
+def test_a_status_that_had_ended_waits_for_the_operator_whatever_the_arm_did(state):
+    stopped = after(state, status_gap=0.5)
+    assert stopped == SafetyState(Mode.STOPPED, Cause.STATUS_ENDED)
+    assert after(stopped) == stopped
+
+
+def test_after_a_pause_an_arm_that_is_elsewhere_stays_there():
+    state = SafetyState(Mode.PAUSED, Cause.STATUS_OLD, fresh_since=9.6)
+    assert after(state, lag=0.009).may_move
+    assert after(state, lag=0.011) == SafetyState(Mode.STOPPED, Cause.MOVED)
 
 
 @pytest.mark.parametrize(("seen", "cause"), LATCHED[:3])

@@ -105,3 +105,29 @@ def test_targets_out_of_order_are_refused():
     playout.add(1.0, np.zeros(7))
     with pytest.raises(ValueError, match="comes after"):
         playout.add(1.0, np.zeros(7))
+
+
+def test_a_posture_may_be_held_as_long_as_it_likes_and_the_motion_after_it_begins_there():
+    playout = TargetPlayout()
+    held = swing(0.5)[0]
+    for now in np.arange(0, 160, 0.02):
+        playout.add(now, swing(min(now, 0.5) + max(now - 150.0, 0.0))[0])
+        if 10 < now < 140:  # an operator thinks it over
+            continue
+        target = playout.advance(0.02)
+        if 2 < now < 150:
+            np.testing.assert_allclose(target.position, held, atol=1e-4)
+    assert len(playout._times) < 200
+    np.testing.assert_allclose(target.position, 0.0, atol=1e-6)
+
+
+def test_an_arm_that_stopped_before_its_clock_did_goes_on_from_where_it_is():
+    playout = TargetPlayout()
+    for t in np.arange(0, 3, 0.01):
+        playout.add(t, swing(t)[0])
+    for _ in range(250):
+        playout.advance(PERIOD)
+    earlier = playout.time - 0.3
+    assert playout.distance(swing(earlier)[0]) < 1e-3
+    playout.resume_near(swing(earlier)[0])
+    assert playout.time == pytest.approx(earlier, abs=0.01)

@@ -1,17 +1,18 @@
 """The emulated driver and the command path in one process, on a clock that the test turns: no LCM, no waiting.
 
-What is real here: PacedCommands and CommandStream as the process of commands calls them, PandaDriver and its
-robot as the emulator does. What is not: the physics (the robot is where it sets itself) and the network (what
-is sent arrives at once, or is lost).
+What is real here: CommandSession with its doors and its stream, as the process of commands calls it, and PandaDriver
+with its robot, as the emulator does. What is not: the physics (the robot is where it sets itself) and the network,
+which keeps the first message of a channel until it is listened to, as LCM does, and may lose commands.
 """
 
 import numpy as np
+from drake import lcmt_image_array
 
-from riseg_drake.robot.command_stream import ArmStatus, CommandParameters, CommandStream, TipGeometry
+from riseg_drake.robot.command_stream import CommandParameters, CommandStream, TipGeometry
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.limits import PANDA_LIMITS
-from riseg_drake.robot.paced_commands import PacedCommands
-from riseg_drake.stations.command_process import command_message
+from riseg_drake.stations.command_session import CommandSession, command_message
+from riseg_drake.stations.ideal_arm import status_message
 from riseg_drake.stations.panda_driver import PandaDriver, PandaDriverConfig
 from riseg_drake.stations.panda_robot import GUIDING
 
@@ -51,20 +52,17 @@ class DriverAndStream:
         self.parameters.mode = mode
         self.driver = PandaDriver(PandaDriverConfig(control_mode=mode, **driver), q, limits)
         self.stream = CommandStream(self.parameters, tip or ideal_tip(), limits)
-        self.paced = PacedCommands(self.stream, STEADY)
+        self.session = CommandSession(self.stream, STEADY, "PANDA_STATUS", "IMAGES")
         self.now = 0.0
-        self._ticks = 0
         self.stalls = {"asleep": 0.0, "at work": 0.0}
-        self.status = None
-        """The newest that the client has heard: old once the driver is gone."""
-        self._handed_on = None
         self.shows_pictures = True
-        self._image_time = WALL
         self.torque_external = np.zeros(7)
         self.sent = []
         """(time, s, command) of all that was sent, lost ones included."""
         self.trace = []
         """(time, s, robot_mode, q_d, v_d) of every tick."""
+        self._ticks = 0
+        self._unheard = None
 
     @property
     def robot(self):
@@ -80,27 +78,19 @@ class DriverAndStream:
         self._ticks += 1
         self.now = TICK * self._ticks
         self.driver.tick(round(1e6 * self.wall))
-        robot, config = self.robot, self.driver.config
+        robot = self.robot
         self.trace.append((self.now, robot.mode, robot.q_d, robot.v_d))
-        if self.shows_pictures:
-            self._image_time = self.wall
-        if self.driver.is_connected:
-            position_error, velocity_error = self.rng.standard_normal((2, 7))
-            self.status = ArmStatus(
-                self.wall,
-                robot.q_d + config.position_noise * position_error,
-                robot.v_d + config.velocity_noise * velocity_error,
-                self.torque_external,
-                robot.mode,
-                gap=self._gap_now(),
-            )
+        if self.driver.is_connected and self._unheard is None:
+            self._unheard = self._status()
 
-    def _gap_now(self):
-        """Largest time between two statuses since the client was last handed one, s."""
-        if self.status is not None:
-            gap = self.wall - self.status.time
-            return gap if self.status is self._handed_on else max(gap, self.status.gap)
-        return 0.0
+    def _status(self):
+        robot, config = self.robot, self.driver.config
+        position_error, velocity_error = self.rng.standard_normal((2, 7))
+        message = status_message(self.wall, robot.q_d + config.position_noise * position_error, robot.mode)
+        message.joint_velocity = (robot.v_d + config.velocity_noise * velocity_error).tolist()
+        message.joint_torque_external = self.torque_external.tolist()
+        message.robot_utime = 1000 * self._ticks
+        return message.encode()
 
     def let(self, seconds):
         """Time passes, without the client."""
@@ -111,16 +101,22 @@ class DriverAndStream:
 
     def cycle(self):
         """One round of the client's process."""
-        self._handed_on = self.status
-        command = self.paced.next(STEADY + self.now, self.wall, self.status, self._image_time)
+        if self._unheard is not None:
+            self.session.hear_status(self._unheard)
+            self._unheard = None
+        if self.shows_pictures:
+            picture = lcmt_image_array()
+            picture.header.utime = round(1e6 * self.wall)
+            self.session.hear_picture(picture.encode())
+        command = self.session.next(STEADY + self.now, self.wall)
         self.let(self.stalls["at work"])
         if command is not None and command.is_in_time(STEADY + self.now):
-            self.paced.was_sent(command)
+            self.session.was_sent(command)
             self.sent.append((self.now, command))
             if self.rng.random() >= self.lost:
                 self.driver.receive(command_message(command.values, self.parameters.mode, command.stamp))
         late = self.wakes_late(self.rng)
-        self.let(self.paced.wait(STEADY + self.now) + self.stalls["asleep"] + late)
+        self.let(self.session.wait(STEADY + self.now) + self.stalls["asleep"] + late)
         self.stalls = dict.fromkeys(self.stalls, 0.0)
 
     def run(self, seconds):
@@ -128,16 +124,16 @@ class DriverAndStream:
         end = self.now + seconds
         while self.now < end - 1e-9:
             self.cycle()
+        assert not self.session.failed
         return self
 
-    def plan(self, path, begin=None):
-        """Send the targets of a trajectory (`value(t)` [7, 1], `end_time()`), every 10 ms, from `begin`, s.
+    def plan(self, path):
+        """Send the targets of a trajectory (`value(t)` [7, 1], `end_time()`), every 10 ms, from now on.
 
-        `begin` is a wall time (now). Targets go on for a second at its end, as the product's do.
+        Targets go on for a second at its end, as the product's do.
         """
-        begin = self.wall if begin is None else begin
         for t in np.arange(0, path.end_time() + 1, 0.01):
-            self.stream.add_target(begin + t, path.value(min(t, path.end_time()))[:, 0])
+            self.session.obey("target", self.wall + t, path.value(min(t, path.end_time()))[:, 0])
 
     def restart(self):
         """Somebody sees to it that the robot is not stopped, and starts the driver; wait until it speaks."""

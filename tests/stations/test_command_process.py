@@ -12,7 +12,8 @@ from riseg_drake.robot.command_stream import CommandParameters
 from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.supervisor import Cause, Mode
-from riseg_drake.stations.command_process import FINAL_COMMANDS, CommandProcess, command_message
+from riseg_drake.stations.command_process import CommandProcess
+from riseg_drake.stations.command_session import FINAL_COMMANDS, command_message
 from riseg_drake.stations.ideal_arm import IdealArm
 from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm
 
@@ -43,7 +44,7 @@ def speak_until(arm, condition, patience=30):
 def test_it_holds_the_arm_stops_for_a_reflex_and_ends_when_told():
     config = LcmConfig(url="udpm://239.255.76.67:7671?ttl=0")
     arm = IdealArm(config)
-    with CommandProcess(config, CommandParameters(), PandaDescription()) as commands:
+    with CommandProcess(config, CommandParameters(mode="position"), PandaDescription()) as commands:
         time.sleep(0.05)
         arm.listen()
         assert not arm.commands  # nothing before the arm has spoken

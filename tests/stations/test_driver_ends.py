@@ -29,7 +29,7 @@ def moving(session):
 
 
 def pushing(session):
-    session.stream.expect_contact(session.wall, session.wall + 10)
+    session.session.obey("contact", session.wall, session.wall + 10)
     moving(session)
 
 
@@ -90,14 +90,14 @@ def test_the_arm_stays_where_the_hand_left_it_until_the_operator_speaks(mode, ph
     assert session.fastest(since=back) <= 0.01
     assert session.driver.end is None
 
-    session.stream.abandon_path()
-    session.stream.release()
+    session.session.obey("abandon")
+    session.session.obey("release")
     word = session.now
     session.run(0.1)
     first = session.sent_since(word)[0].values
     np.testing.assert_allclose(first, np.zeros(7) if mode == "velocity" else here, atol=1e-3)
     np.testing.assert_allclose(session.stream.position, here, atol=1e-3)
-    session.stream.begin_path()
+    session.session.obey("begin")
     path = way(here, here + 0.05)
     session.plan(path)
     session.run(path.end_time() + 1.5)

@@ -5,10 +5,11 @@ from pydrake.systems.analysis import Simulator
 
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.stations.contract import STATION_INPUTS, STATION_OUTPUTS, check_contract
+from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.hardware import HardwareStation, HardwareStationConfig
 from riseg_drake.stations.ideal_arm import status_message
 from riseg_drake.stations.lcm_images import ImageError, encode_images
-from riseg_drake.stations.lcm_reception import Reception
+from riseg_drake.stations.lcm_reception import BLIND, Reception
 
 START = 1_790_000_000.0
 """A wall time."""
@@ -22,8 +23,10 @@ class Bench:
         self.lcm = DrakeLcm("memq://")
         self.now = START
         self.sent = []
-        self.reception = Reception(self.lcm, self.config.lcm, replayed, clock=lambda: self.now)
-        self.station = HardwareStation(self.config, self.reception, self, clock=lambda: self.now)
+        self.set_by = 0.0  # somebody has set the computer's clock
+        clock = EvenClock(lambda: self.now + self.set_by, lambda: self.now - START)
+        self.reception = Reception(self.lcm, self.config.lcm, replayed, clock)
+        self.station = HardwareStation(self.config, self.reception, self)
         self.simulator = Simulator(self.station)
         self.context = self.simulator.get_mutable_context()
         self.context.SetTime(START)
@@ -37,11 +40,13 @@ class Bench:
         return self.now
 
     def status(self, time, position):
+        self.now = self.now if self.reception.offset else max(self.now, time)
         message = status_message(time, position)
         self.lcm.Publish(self.config.lcm.status_channel, message.encode())
         self.reception.listen()
 
     def picture(self, time, gray=100, depth=0.5, aligned=True):
+        self.now = self.now if self.reception.offset else max(self.now, time + 0.03)
         color = np.full((480, 848, 3), gray, np.uint8)
         metres = np.full((480, 848), depth, np.float32)
         message = encode_images(
@@ -142,10 +147,15 @@ def test_a_diagram_that_is_late_catches_up_before_it_looks_at_another_picture():
 
 def test_depth_that_is_not_aligned_is_refused_with_the_flag_to_set():
     bench = Bench()
-    bench.moving_arm(START + 0.5)
-    bench.picture(START + 0.3, aligned=False)
+
+    def show():
+        for time in START + np.arange(0.1, BLIND + 0.5, 0.1):
+            bench.picture(time, aligned=False)
+            bench.advance(time + 0.1)
+
     with pytest.raises(ImageError, match="--software_depth_registration"):
-        bench.advance(START + 0.5)
+        show()
+    assert bench.now - START >= BLIND
 
 
 def test_targets_go_out_every_ten_milliseconds_with_the_time_they_are_meant_for():

@@ -24,7 +24,7 @@ class Session(DriverAndStream):
         while 0.01 * self.targets <= self.now:
             t = 0.01 * self.targets
             share = (1 - np.cos(2 * np.pi * t / SWING_TIME)) / 2
-            self.stream.add_target(WALL + t, READY + SWING * share)
+            self.session.obey("target", WALL + t, READY + SWING * share)
             self.targets += 1
         super().cycle()
         assert self.driver.end is None, (self.now, self.driver.end)

@@ -88,10 +88,10 @@ class Eyes(LeafSystem):
             )
 
 
-def wired(script, parameters=None):
+def wired(script, parameters=None, way_back=None):
     """ArmMotion with its stand-in, an arm that is where it is told to be, and a log of the commands."""
     builder = DiagramBuilder()
-    motion = builder.AddSystem(ArmMotion(Q_OBSERVE, parameters))
+    motion = builder.AddSystem(ArmMotion(Q_OBSERVE, parameters, way_back=way_back))
     eyes = builder.AddSystem(Eyes(script))
     for name in ("pair", "mask", "push"):
         builder.Connect(eyes.GetOutputPort(name), motion.GetInputPort(name))
@@ -102,9 +102,9 @@ def wired(script, parameters=None):
     return builder.Build(), motion, log
 
 
-def run(script, until, parameters=None):
+def run(script, until, parameters=None, way_back=None):
     """Phases in their order, with the simulator's final context, ArmMotion and the log."""
-    diagram, motion, log = wired(script, parameters)
+    diagram, motion, log = wired(script, parameters, way_back)
     simulator = Simulator(diagram)
     context = motion.GetMyContextFromRoot(simulator.get_context())
     phases = []
@@ -257,3 +257,59 @@ def test_an_arm_that_has_not_set_out_yet_is_not_taken_for_one_that_is_back():
     late[0] = 20.0
     simulator.AdvanceTo(16.0)
     assert motion.GetOutputPort("interaction_step").Eval(context) == 2
+
+
+BY_HAND = THERE + np.array([-0.3, 0.1, 0.2, 0.0, 0.1, 0.0, 0.0])
+
+
+def ways_back(*looks):
+    """A way back from where a hand has put the arm, at these of the looks for one; whether it was taken."""
+    count = iter(range(10**6))
+
+    def way_back():
+        if next(count) not in looks:
+            return None
+        return rest_to_rest(np.array([BY_HAND, Q_OBSERVE]), minimum_jerk, SpeedLimits(), PANDA_LIMITS)
+
+    return way_back
+
+
+def test_a_push_is_given_up_for_the_way_back_and_counts_as_one_that_is_judged():
+    script = Script([push_to(THERE), push_to(THERE, at=0.1)], ids_after=[0, 3, 3])
+    phases, motion, context, log = run(script, 12.0, way_back=ways_back(15))
+    cut_short = [ArmPhase.APPROACH, ArmPhase.RETREAT, ArmPhase.OBSERVE]
+    whole = [ArmPhase.APPROACH, ArmPhase.PUSH, ArmPhase.RETREAT, ArmPhase.OBSERVE]
+    assert phases == [ArmPhase.OBSERVE, *cut_short, *whole, ArmPhase.DONE]
+    assert motion.GetOutputPort("interaction_step").Eval(context) == 2
+    assert [push.changed for push in motion.GetOutputPort("tried_pushes").Eval(context)] == [True, False]
+    # From where the arm was put, and to the observation posture.
+    jump = np.abs(np.diff(log.data())).max(axis=0).argmax()
+    assert log.data()[:, jump + 1] == pytest.approx(BY_HAND, abs=1e-3)
+    assert log.data()[:, -1] == pytest.approx(Q_OBSERVE)
+
+
+def test_an_arm_that_only_looked_comes_back_without_an_interaction_and_asks_anew_for_a_push():
+    script = Script([push_to(THERE)])
+    phases, motion, context, _ = run(script, 12.0, way_back=ways_back(3))
+    once = [ArmPhase.APPROACH, ArmPhase.PUSH, ArmPhase.RETREAT, ArmPhase.OBSERVE]
+    assert phases == [ArmPhase.OBSERVE, *once, ArmPhase.DONE]
+    assert motion.GetOutputPort("interaction_step").Eval(context) == 1
+    back = rest_to_rest(np.array([BY_HAND, Q_OBSERVE]), minimum_jerk, SpeedLimits(), PANDA_LIMITS)
+    assert min(asked for asked, _ in script.asked) > back.end_time()
+
+
+def test_a_proposal_is_withdrawn_when_the_arm_is_led_away():
+    push = push_to(THERE)
+    builder = DiagramBuilder()
+    motion = builder.AddSystem(ArmMotion(Q_OBSERVE, None, lambda _: Permission.WAIT, way_back=ways_back(60)))
+    eyes = builder.AddSystem(Eyes(Script([push])))
+    for name in ("pair", "mask", "push"):
+        builder.Connect(eyes.GetOutputPort(name), motion.GetInputPort(name))
+    builder.Connect(motion.GetOutputPort("interaction_step"), eyes.GetInputPort("interaction_step"))
+    builder.Connect(motion.GetOutputPort("position"), motion.GetInputPort("position_measured"))
+    simulator = Simulator(builder.Build())
+    context = motion.GetMyContextFromRoot(simulator.get_context())
+    simulator.AdvanceTo(1.9)
+    assert motion.GetOutputPort("active_push").Eval(context) is push
+    simulator.AdvanceTo(2.1)
+    assert motion.GetOutputPort("active_push").Eval(context) is None
