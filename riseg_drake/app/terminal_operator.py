@@ -75,8 +75,11 @@ class TerminalOperator:
             return
         while not (said := self.answer(f"{question}: y to go, q to end", f"y {QUIT}")):
             time.sleep(0.05)
-        if said != "y":
-            raise RunStoppedError(self.why_quit) if self._closed else KeyboardInterrupt
+        if said == "y":
+            return
+        if self._closed:
+            raise RunStoppedError(self.why_quit)
+        raise KeyboardInterrupt
 
     def released(self, stop: str) -> bool | None:
         """Whether the arm may move again after a stop; None while there is no answer.

@@ -271,7 +271,7 @@ class CommandStream:
         return last
 
     def brake(self) -> NDArray[np.float64] | None:
-        """The command of one period of coming to rest, whatever is known: nothing is looked at any more."""
+        """The command [7] of one period of coming to rest, whatever is known: nothing is looked at any more."""
         if self._limiter is None or self._is_silent:
             return None
         self._limiter.stop()

@@ -68,7 +68,7 @@ class PacedCommands:
         return self._due_now(steady, wall, lambda: self._stream.step(steady, status, image_time))
 
     def brake(self, steady: float, wall: float) -> StampedCommand | None:
-        """The same for an arm that must come to rest, whatever is known of it, by the stop kept ready."""
+        """The same, by both clocks, s, for an arm that must come to rest whatever is known of it."""
         if steady - self._followed > LONGEST_PAUSE and self._last is not None:
             self._stream.begin_at_rest(self._last)
             self._due = steady

@@ -111,7 +111,7 @@ class CommandSession:
                 case "end":
                     self._stream.end(Cause.FINISHED)
                 case _:
-                    raise RuntimeError(f"{word!r} is not known to the process that sends commands")
+                    self.fail(ValueError(f"{word!r} is not known to the process that sends commands"))
         except Exception as error:
             self.fail(error)
 
@@ -125,7 +125,7 @@ class CommandSession:
         self._stream.end(Cause.FAULT)
 
     def next(self, steady: float, wall: float) -> StampedCommand | None:
-        """One round: the command due now, by a steady clock and by that of stamps, s; None while there is none."""
+        """One round: the command due now, by a steady clock and that of stamps, s; None while there is none."""
         command = None
         if not self.failed:
             try:

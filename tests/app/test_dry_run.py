@@ -8,6 +8,7 @@ from riseg_drake.app import dry_run
 from riseg_drake.app.dry_run import DryRun
 from riseg_drake.app.interactions import Progress
 from riseg_drake.app.scenario import HARDWARE, load_scenario
+from riseg_drake.app.terminal_operator import TerminalOperator
 from riseg_drake.robot.kinematics import READY, PandaKinematics
 from riseg_drake.systems.arm_motion import Permission
 
@@ -76,7 +77,28 @@ def test_the_way_that_is_drawn_is_the_tips():
 
 
 def test_the_operator_may_end_it():
-    assert made("q")[0].permit(push()) is Permission.END
+    run, *_ = made("q")
+    assert run.permit(push()) is Permission.END
+    assert run._progress.end == "the operator ended it"
+
+
+def test_without_a_terminal_it_ends_with_that_reason():
+    scenario, console, progress = load_scenario(None, HARDWARE), Console(file=io.StringIO()), Progress()
+    operator = TerminalOperator(console, consents=False, terminal=io.StringIO(""))
+    run = DryRun(scenario, None, operator, console, progress)
+    wanted, said = push(), Permission.WAIT
+    while said is Permission.WAIT:
+        said = run.permit(wanted)
+    assert said is Permission.END
+    assert progress.end.startswith("nobody can answer: there is no terminal")
+    assert "--yes" in progress.end
+
+
+def test_after_the_last_push_it_says_that_all_were_shown():
+    run, *_, scenario = made(*"nnnnn")
+    for _ in range(scenario.arm.most_interactions):
+        run.permit(push())
+    assert run._progress.end == "5 of 5 pushes were shown, and none was done"
 
 
 def test_unasked_each_push_is_shown_for_a_while(monkeypatch):

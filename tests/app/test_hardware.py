@@ -1,5 +1,8 @@
+import json
+
 import numpy as np
 import pytest
+from drake import lcmt_panda_status
 from pydrake.lcm import DrakeLcm
 from pydrake.math import RigidTransform
 
@@ -7,7 +10,10 @@ from riseg_drake.app.arm_travel import TravelError, WayBack, straight_motion
 from riseg_drake.app.cli import main
 from riseg_drake.app.diagram import make_diagram
 from riseg_drake.app.hardware import HardwareError, check_limits, wait_for_drivers
+from riseg_drake.app.interactions import Progress
+from riseg_drake.app.output import SUMMARY, RunFolder
 from riseg_drake.app.planned_speed import planned_limits, push_parameters
+from riseg_drake.app.run import RunStoppedError, state_of
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.stream_bench import is_even
@@ -16,7 +22,10 @@ from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pushing.time_law import SpeedLimits
 from riseg_drake.robot.kinematics import READY, PandaKinematics, observation_posture, tip_pointing_down
 from riseg_drake.robot.limits import PANDA_LIMITS
+from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.ground_truth import LABEL_CHANNEL, POSE_CHANNEL, encode_labels, encode_poses
+from riseg_drake.stations.ideal_arm import status_message
+from riseg_drake.stations.lcm_images import ImageError, encode_images
 from riseg_drake.stations.lcm_reception import Reception
 
 
@@ -93,6 +102,119 @@ def test_drivers_that_are_not_there_are_named():
     reception = Reception(DrakeLcm("memq://"), config.lcm)
     with pytest.raises(HardwareError, match=r"PANDA_STATUS.*nor on DRAKE_RGBD_CAMERA_IMAGES_emulated"):
         wait_for_drivers(reception, config, patience=0.0)
+
+
+class Drivers:
+    """Arm and camera on a network of this process, on a clock of their own, heard by a Reception."""
+
+    def __init__(self):
+        self.config, self.now = load_scenario(None, HARDWARE).hardware, 5000.0
+        self.lcm = DrakeLcm("memq://")
+        self.reception = Reception(
+            self.lcm, self.config.lcm, clock=EvenClock(lambda: self.now, lambda: self.now)
+        )
+
+    def speak(self, mode=lcmt_panda_status.kMove, stamp_off=0.0):
+        self.now += 0.01
+        message = status_message(self.now + stamp_off, READY, mode)
+        self.lcm.Publish("PANDA_STATUS", message.encode())
+        self.reception.listen()
+
+    def show(self, aligned=True, damaged=False):
+        color, depth = np.zeros((480, 848, 3), np.uint8), np.ones((480, 848), np.float32)
+        message = encode_images(color, depth if aligned else None, self.now, self.now, 0, raw_depth=depth)
+        data = message.encode()
+        self.lcm.Publish(self.config.lcm.image_channel, data[: len(data) // 2] if damaged else data)
+        self.reception.listen()
+
+    def missing(self, ready=True):
+        """What is said when no patience is left; "" if nothing is missing."""
+        try:
+            wait_for_drivers(self.reception, self.config, patience=0.0, ready=ready)
+        except HardwareError as error:
+            return str(error)
+        return ""
+
+
+@pytest.mark.parametrize(
+    ("mode", "words"),
+    [
+        (lcmt_panda_status.kUserStopped, r"robot_mode is 5 \(user stopped: release the user stop"),
+        (lcmt_panda_status.kReflex, r"robot_mode is 4 \(reflex: unlock"),
+        (lcmt_panda_status.kIdle, r"robot_mode is 1 \(idle: is the driver started with --control_mode"),
+        (lcmt_panda_status.kGuiding, r"robot_mode is 3 \(guided by hand"),
+    ],
+)
+def test_an_arm_that_takes_no_commands_is_not_waited_for_in_silence(mode, words):
+    drivers, said = Drivers(), []
+    drivers.speak(mode)
+    drivers.show()
+    with pytest.raises(HardwareError, match=words):
+        wait_for_drivers(drivers.reception, drivers.config, patience=0.0, ready=True, say=said.append)
+    assert said[0].startswith("waiting: robot_mode is ")
+    assert not drivers.missing(ready=False)  # a dry run moves nothing
+    drivers.speak()
+    assert not drivers.missing()
+
+
+def test_a_status_that_has_ended_is_told():
+    drivers = Drivers()
+    drivers.speak()
+    drivers.now += 2
+    drivers.show()
+    assert "PANDA_STATUS has ended (start drake-franka-driver again)" in drivers.missing()
+
+
+def test_messages_that_are_left_out_are_told_to_whoever_waits_for_others():
+    drivers = Drivers()
+    drivers.speak(stamp_off=7.0)
+    drivers.show()
+    assert "ahead of this computer's clock (by 7.000 s; computers of drivers and program" in drivers.missing()
+
+
+def test_a_damaged_picture_at_the_beginning_is_waited_out_and_a_camera_of_another_kind_is_named():
+    drivers = Drivers()
+    drivers.speak()
+    drivers.show(damaged=True)
+    assert "no picture came that can be used" in drivers.missing()
+    drivers.show()
+    assert not drivers.missing()
+    other = Drivers()
+    other.speak()
+
+    def show():
+        for _ in range(40):
+            other.now += 0.1
+            other.show(aligned=False)
+            other.missing(ready=False)
+
+    with pytest.raises(ImageError, match="--software_depth_registration"):
+        show()
+
+
+def test_a_scenario_of_the_drivers_network_alone_is_enough(tmp_path):
+    (tmp_path / "robot.yaml").write_text('station: !HardwareStationConfig {lcm: {url: "memq://"}}\n')
+    scenario = load_scenario(tmp_path / "robot.yaml", HARDWARE)
+    check_limits(scenario)
+    assert scenario.hardware.lcm.url == "memq://"
+
+
+def test_a_run_that_was_stopped_is_not_done(tmp_path):
+    folder = RunFolder(tmp_path / "run", {})
+    progress = Progress()
+    with pytest.raises(RunStoppedError), state_of(folder, progress, []):
+        raise RunStoppedError("the arm was stopped: it was pushed")
+    summary = json.loads((tmp_path / "run" / SUMMARY).read_text())
+    assert (summary["state"], summary["end"]) == ("stopped", "the arm was stopped: it was pushed")
+
+
+def test_a_stopped_run_ends_with_a_line_and_exit_code_2(monkeypatch, capsys):
+    def stopped(chosen, console):
+        raise RunStoppedError("the arm was stopped: it was pushed")
+
+    monkeypatch.setattr("riseg_drake.app.commands.hardware", stopped)
+    assert main(["hardware"]) == 2
+    assert capsys.readouterr().err == "riseg: the arm was stopped: it was pushed\n"
 
 
 class Commands:

@@ -63,6 +63,43 @@ def test_an_error_says_in_one_line_where_it_is_and_what_would_have_been_right(te
     assert "\n" not in str(error.value)
 
 
+@dataclass
+class Lens:
+    shares: list[float] = field(default_factory=lambda: [0.5, 0.5], metadata={"sizes": (0, 2), "least": 0.0})
+    near: float = field(default=0.3, metadata={"least": 0.1, "most": 2.0})
+    far: float | None = field(default=None, metadata={"most": 9.0})
+
+    def check(self):
+        if self.far is not None and self.far <= self.near:
+            raise ValueError(f"far is {self.far:g}; more than near, {self.near:g} m")
+
+
+@dataclass
+class Bench:
+    lens: Lens = field(default_factory=Lens)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("lens:\n  near: 3", "bench.yaml: line 2: lens.near is 3; expected 0.1 to 2"),
+        ("lens:\n  far: 10", "bench.yaml: line 2: lens.far is 10; expected at most 9"),
+        ("lens:\n  shares: [0.1, -2]", "bench.yaml: line 2: lens.shares is -2; expected at least 0"),
+        ("lens:\n  shares: [1]", "bench.yaml: line 2: lens.shares has 1 numbers; expected 0 or 2"),
+        ("lens:\n  near: 1\n  far: 0.5", "bench.yaml: line 3: lens.far is 0.5; more than near, 1 m"),
+    ],
+)
+def test_a_value_out_of_bounds_is_named_with_key_value_and_bound(text, message):
+    with pytest.raises(ScenarioError) as error:
+        parse_scenario(text, Bench, source="bench.yaml")
+    assert str(error.value) == message
+
+
+def test_values_within_bounds_are_taken():
+    lens = parse_scenario("lens: {near: 0.1, far: 9, shares: []}", Bench, source="bench.yaml").lens
+    assert (lens.near, lens.far, lens.shares) == (0.1, 9.0, [])
+
+
 def test_a_missing_file_is_named_with_its_nearest_neighbour(tmp_path):
     (tmp_path / "simulation.yaml").write_text("")
     with pytest.raises(ScenarioError, match=r"simulatoin.yaml is not there; did you mean .*simulation.yaml\?"):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drake import lcmt_image_array
+from drake import lcmt_image_array, lcmt_panda_status
 
 from riseg_drake.app.cli import main
 from riseg_drake.app.hardware import PATIENCE, HardwareError, wait_for_drivers
@@ -20,6 +20,7 @@ from riseg_drake.segmentation.above_table import AboveTableParameters, objects_a
 from riseg_drake.stations import lcm_channels
 from riseg_drake.stations.lcm_images import decode_images, encode_images
 from riseg_drake.systems.frame_view import FrameView
+from tests.app.test_hardware import Drivers
 from tests.docs.pages import CHECKOUT, blocks
 from tests.recording.made_recordings import drawn_frames, write
 from tests.segmentation.drawn_scene import CAMERA, DrawnScene, looking_down, planar
@@ -77,6 +78,27 @@ def depth_as_the_infrared_camera_sees_it(patch):
     main(["hardware"])
 
 
+def user_stop(patch):
+    drivers = Drivers()
+    drivers.speak(lcmt_panda_status.kUserStopped)
+    drivers.show()
+
+    def at_once(chosen, console):
+        try:
+            wait_for_drivers(drivers.reception, drivers.config, patience=0.0, ready=True)
+        except HardwareError as error:
+            raise HardwareError(str(error).replace("within 0 s", f"within {PATIENCE:g} s")) from None
+
+    patch.setattr("riseg_drake.app.commands.hardware", at_once)
+    main(["hardware"])
+
+
+def a_clock_that_is_ahead(patch):
+    drivers = Drivers()
+    drivers.speak(stamp_off=7.0)
+    print(*drivers.reception.untold())
+
+
 def nothing_moves(patch):
     write(Path("my_recording"), drawn_frames(8, moves=False))
     main(["segment", "my_recording"])
@@ -123,6 +145,8 @@ PROVOKED = dict(
             url_without_a_buffer,
             no_drivers,
             depth_as_the_infrared_camera_sees_it,
+            user_stop,
+            a_clock_that_is_ahead,
             nothing_moves,
             no_table,
             millimetres_taken_for_metres,

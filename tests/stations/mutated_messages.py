@@ -24,7 +24,7 @@ def mutated_status(rng, message, stamps=WRONG_STAMPS):
         case 2:
             return rng.bytes(rng.integers(600))
         case 3:
-            # Seldom in what it says: three of those that can be true are two drivers that contradict each other.
+            # Seldom in what it says: three that can be true are two drivers that contradict each other.
             head = len(data) if rng.random() < 0.01 else 20
             return garbled(rng, data[:head]) + data[head:]
         case 4:

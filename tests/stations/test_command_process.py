@@ -12,7 +12,8 @@ from riseg_drake.robot.command_stream import CommandParameters
 from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.supervisor import Cause, Mode
-from riseg_drake.stations.command_process import CommandProcess
+from riseg_drake.stations import command_process
+from riseg_drake.stations.command_process import CommandError, CommandProcess
 from riseg_drake.stations.command_session import FINAL_COMMANDS, command_message
 from riseg_drake.stations.ideal_arm import IdealArm
 from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm
@@ -54,8 +55,9 @@ def test_it_holds_the_arm_stops_for_a_reflex_and_ends_when_told():
         speak_until(arm, lambda: commands.report.state.mode is Mode.STOPPED)
         assert commands.report.state.cause is Cause.REFLEX
         speak_until(arm, lambda: commands.report.position is None)
-        commands.release()
         arm.mode = lcmt_panda_status.kMove
+        speak_until(arm, lambda: commands.report.status.robot_mode == lcmt_panda_status.kMove)
+        commands.release()
         speak_until(arm, lambda: commands.report.state.may_move)
     assert len(commands.send_times) > 20
 
@@ -121,3 +123,36 @@ def test_at_ctrl_c_or_left_alone_the_process_brings_the_arm_to_rest_and_ends(hap
         assert {tuple(command.joint_position) for command in last} == {tuple(last[0].joint_position)}
     if happens is ctrl_c:
         assert session.commands.report.state.cause is Cause.INTERRUPT
+
+
+def die_at_once(*_):
+    os._exit(3)
+
+
+@pytest.mark.renders
+def test_a_process_that_dies_before_it_is_ready_is_told_in_one_line(monkeypatch):
+    monkeypatch.setattr(command_process, "stream_commands", die_at_once)
+    with pytest.raises(CommandError, match="did not start: it ended with exit code 3"):
+        CommandProcess(LcmConfig(url="memq://"), CommandParameters(), PandaDescription())
+
+
+@pytest.mark.renders
+def test_a_process_that_cannot_begin_says_why():
+    nowhere = PandaDescription(arm_url="package://riseg_drake_models/no_such.urdf")
+    with pytest.raises(CommandError, match=r"did not start: \w+: .*no_such\.urdf") as error:
+        CommandProcess(LcmConfig(url="memq://"), CommandParameters(), nowhere)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize("mode", ["position", "velocity"])
+def test_garbage_in_the_pipe_brakes_the_arm_and_ends_the_process_with_the_reason(mode):
+    session = Swinging(mode)
+    session.until(lambda: session.speed() > 0.1)
+    session.commands._connection.send_bytes(b"garbage")
+    session.until(lambda: not session.commands._process.is_alive(), plans=False)
+    session.ears.HandleSubscriptions(0)
+    assert session.speed() == 0
+    assert session.commands._process.exitcode == 1
+    with pytest.raises(CommandError, match="brought the arm to rest: UnpicklingError"):
+        _ = session.commands.report

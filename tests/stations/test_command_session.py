@@ -1,4 +1,4 @@
-"""Whatever messages come in and whatever goes wrong, on a clock that the test turns: the arm goes on or brakes."""
+"""Whatever comes in and whatever goes wrong, on a clock that the test turns: the arm goes on or brakes."""
 
 import os
 from collections import Counter
@@ -30,7 +30,7 @@ SWING = 0.25 * np.array([1, 0.7, -1, 0.7, 1, -1, 1])  # rad; up to 0.4 rad/s
 
 
 class Arm:
-    """An arm that follows commands two periods later, with its driver, its camera, and a session that moves it."""
+    """An arm that follows commands two periods later, with driver, camera, and a session that moves it."""
 
     def __init__(self, mode="velocity"):
         tip = TipGeometry(lambda q: np.array([0.5, 0.0, 0.2]), lambda q: np.eye(6, 7, 1))
@@ -314,7 +314,7 @@ def test_any_exception_brakes_the_arm_within_limits_and_is_the_end(fault, mode):
 
 
 def trial(seed):
-    """A motion among mutated messages, then a danger; returns how many, and whether the arm still moved then."""
+    """A motion among mutated messages, then a danger; how many, and whether the arm still moved then."""
     rng = np.random.default_rng(seed)
     arm = Arm(mode=rng.choice(["velocity", "position"]))
     flood, danger, sent = rng.random() < 0.05, DANGERS[seed % len(DANGERS)], 0

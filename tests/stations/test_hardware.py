@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from drake import lcmt_image_array
 from pydrake.lcm import DrakeLcm
 from pydrake.systems.analysis import Simulator
 
@@ -10,6 +11,7 @@ from riseg_drake.stations.hardware import HardwareStation, HardwareStationConfig
 from riseg_drake.stations.ideal_arm import status_message
 from riseg_drake.stations.lcm_images import ImageError, encode_images
 from riseg_drake.stations.lcm_reception import BLIND, Reception
+from tests.stations.mutated_messages import picture_message
 
 START = 1_790_000_000.0
 """A wall time."""
@@ -21,7 +23,7 @@ class Bench:
     def __init__(self, config=None, replayed=False):
         self.config = config or HardwareStationConfig()
         self.lcm = DrakeLcm("memq://")
-        self.now = START
+        self.now, self.replayed = START, replayed
         self.sent = []
         self.set_by = 0.0  # somebody has set the computer's clock
         clock = EvenClock(lambda: self.now + self.set_by, lambda: self.now - START)
@@ -40,20 +42,20 @@ class Bench:
         return self.now
 
     def status(self, time, position):
-        self.now = self.now if self.reception.offset else max(self.now, time)
-        message = status_message(time, position)
+        self.now = self.now if self.replayed else max(self.now, time)
+        message = status_message(time + self.set_by, position)
         self.lcm.Publish(self.config.lcm.status_channel, message.encode())
         self.reception.listen()
 
     def picture(self, time, gray=100, depth=0.5, aligned=True):
-        self.now = self.now if self.reception.offset else max(self.now, time + 0.03)
+        self.now = self.now if self.replayed else max(self.now, time + 0.03)
         color = np.full((480, 848, 3), gray, np.uint8)
         metres = np.full((480, 848), depth, np.float32)
         message = encode_images(
             color,
             metres if aligned else None,
-            time,
-            time + 0.03,
+            time + self.set_by,
+            time + self.set_by + 0.03,
             0,
             raw_depth=None if aligned else metres,
         )
@@ -176,3 +178,70 @@ def test_a_replayed_log_counts_as_now():
     bench.advance(START + 0.2)
     assert bench.read("wrist.image_time")[0] == pytest.approx(START + 0.05, abs=1e-6)
     np.testing.assert_allclose(bench.read("panda.position_measured"), READY + 0.05, atol=1e-5)
+
+
+@pytest.mark.parametrize("step", [-1.0, -0.05, 0.05, 1.0])
+def test_a_clock_that_is_set_changes_neither_the_pairing_nor_the_flow_of_pictures(step):
+    bench = Bench()
+    bench.moving_arm(START + 0.5)
+    bench.picture(START + 0.4)
+    bench.advance(START + 0.5)
+    bench.set_by = step
+    for time in np.arange(START + 0.51, START + 1, 0.01):
+        bench.status(time, READY + (time - START))  # stamped by the clock as it is now
+    bench.picture(START + 0.75)
+    bench.advance(START + 1.0)
+    assert bench.read("wrist.image_time")[0] == pytest.approx(START + 0.75, abs=1e-6)
+    np.testing.assert_allclose(bench.read("panda.position_measured"), READY + 0.75, atol=1e-5)
+
+
+def test_a_status_or_a_picture_stamped_an_hour_ahead_changes_nothing():
+    bench = Bench()
+    bench.moving_arm(START + 0.5)
+    for message in (status_message(START + 3600, READY), picture_message(START + 3600)):
+        channel = bench.config.lcm.image_channel if message.__class__ is lcmt_image_array else "PANDA_STATUS"
+        bench.lcm.Publish(channel, message.encode())
+        bench.reception.listen()
+    for time in np.arange(START + 0.51, START + 1, 0.01):
+        bench.status(time, READY + (time - START))
+    bench.picture(START + 0.75)
+    bench.advance(START + 1.0)
+    np.testing.assert_allclose(bench.read("panda.position_measured"), READY + 0.75, atol=1e-5)
+    assert sum(bench.reception.left_out.values()) == len(bench.reception.untold()) == 2
+
+
+def cut_off(data):
+    return data[: len(data) // 2]
+
+
+def with_damaged_pixels(data):
+    return data[:400] + bytes(len(data) - 800) + data[-400:]
+
+
+@pytest.mark.parametrize("damage", [cut_off, with_damaged_pixels])
+def test_a_damaged_picture_is_left_out_and_counted_and_the_next_one_is_shown(damage):
+    bench = Bench()
+    bench.moving_arm(START + 1)
+    color, depth = np.full((480, 848, 3), 90, np.uint8), np.full((480, 848), 0.5, np.float32)
+    data = encode_images(color, depth, START + 0.4, START + 0.43, 0).encode()
+    bench.lcm.Publish(bench.config.lcm.image_channel, damage(data))
+    bench.reception.listen()
+    bench.advance(START + 0.6)
+    assert bench.read("wrist.image_time")[0] < 0
+    assert sum(bench.reception.left_out.values()) == 1
+    bench.picture(START + 0.7)
+    bench.advance(START + 1)
+    assert bench.read("wrist.image_time")[0] == pytest.approx(START + 0.7, abs=1e-6)
+
+
+def test_a_camera_that_stamps_by_a_clock_of_its_own_is_told():
+    bench = Bench()
+    bench.moving_arm(START + 1)
+    color, depth = np.full((480, 848, 3), 90, np.uint8), np.full((480, 848), 0.5, np.float32)
+    bench.lcm.Publish(
+        bench.config.lcm.image_channel, encode_images(color, depth, 17.0, START + 0.9, 0).encode()
+    )
+    bench.reception.listen()
+    bench.advance(START + 1)
+    (line,) = bench.reception.untold()
+    assert "global time" in line
