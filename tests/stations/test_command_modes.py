@@ -1,7 +1,10 @@
 """Which mode is calm: what low pass and rate limiter make of a whole run in each, on a clock of its own.
 
-`python -m pytest -n 0 -s tests/stations/test_command_modes.py` prints the table of docs/emulator.md.
+`RISEG_ALL_MODES=1 python -m pytest -n 0 -s tests/stations/test_command_modes.py` prints the table of
+docs/emulator.md; commands at 1 kHz take a minute more.
 """
+
+import os
 
 import numpy as np
 import pytest
@@ -11,7 +14,7 @@ from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.pushing.push import Push
 from riseg_drake.pushing.push_path import PlannedSpeed, PushPathParameters, plan_push_path
 from riseg_drake.pushing.pusher import Pusher
-from riseg_drake.robot.command_stream import CommandParameters, TipGeometry
+from riseg_drake.robot.command_stream import CommandParameters
 from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import PandaKinematics, observe_pose
 from riseg_drake.robot.limits import ROBOTS
@@ -21,17 +24,15 @@ INTERACTIONS = 5
 CALM_ACCELERATION, CALM_AT_LIMIT = 0.3, 1e-3
 """What is asked of the mode that is used: acceleration, share of the limit, rms; share of ticks at a limit."""
 
-MODES = {
-    "positions at 200 Hz": ("position", 200.0, "kept awake"),
-    "positions at 1 kHz": ("position", 1000.0, "kept awake"),
-    "positions at 1 kHz, jitter": ("position", 1000.0, "jitter"),
-    "velocities at 200 Hz": ("velocity", 200.0, "kept awake"),
-    "velocities at 200 Hz, jitter": ("velocity", 200.0, "jitter"),
-}
 
-SLEEPS = {"kept awake": lambda rng: 0.0, "jitter": lambda rng: rng.exponential(3e-4)}
-"""By how much a process sleeps too long, s. With a mean of 0.3 ms one in a thousand sleeps is 2 ms too long,
-somewhat worse than `riseg bench --stream` measures."""
+def on_time(rng):
+    """The process of commands never sleeps too long, s."""
+    return 0.0
+
+
+def jitter(rng):
+    """It sleeps 0.3 ms too long, and 2 ms one time in a thousand: s; worse than `riseg bench --stream` says."""
+    return rng.exponential(3e-4)
 
 
 def planned_run(name):
@@ -65,29 +66,53 @@ def planned_run(name):
 
 @pytest.fixture(scope="module", params=ROBOTS)
 def robot(request):
+    """A robot's name, where it looks from, and its paths."""
     return (request.param, *planned_run(request.param))
 
 
-def whole_run(name, q_observe, paths, mode, rate, sleep):
-    tip = TipGeometry(lambda q: np.array([0.5, 0.0, 0.2]), lambda q: np.eye(6, 7))
-    session = DriverAndStream(
-        mode,
-        ROBOTS[name],
-        q_observe,
-        CommandParameters(rate=rate),
-        tip,
-        wakes_late=SLEEPS[sleep],
-    ).run(0.1)
-    for path in paths:
+def verdict_on(robot, parameters, wakes_late, interactions=INTERACTIONS):
+    """How calm the robot's own motion is over a whole run."""
+    name, q_observe, paths = robot
+    session = DriverAndStream(parameters.mode, ROBOTS[name], q_observe, parameters, wakes_late=wakes_late).run(
+        0.1
+    )
+    for path in paths[:interactions]:
         session.plan(path)
         session.run(path.end_time() + 1)
     session.run(1)
     assert session.driver.end is None, session.driver.end
-    np.testing.assert_allclose(session.robot.q_d, q_observe, atol=2e-3)
-    return session.driver.judge.verdict()
+    np.testing.assert_allclose(session.robot.q_d, q_observe, atol=1e-3)
+    verdict = session.driver.judge.verdict()
+    print(f"\n{name}, {parameters.mode} at {parameters.rate:g} Hz, {wakes_late.__name__}: {verdict}")
+    return verdict
 
 
-@pytest.mark.parametrize("how", MODES)
-def test_a_whole_run(robot, how):
-    verdict = whole_run(*robot, *MODES[how])
-    print(f"\n{robot[0]}, {how}: {verdict}")
+def is_calm(verdict):
+    assert verdict.seconds > 5
+    return verdict.acceleration_rms <= CALM_ACCELERATION and verdict.at_limit <= CALM_AT_LIMIT
+
+
+def test_in_the_mode_of_the_defaults_a_whole_run_is_calm_also_where_commands_come_unevenly(robot):
+    assert is_calm(verdict_on(robot, CommandParameters(), jitter))
+
+
+def test_positions_at_200_hz_come_out_at_a_limit_in_most_ticks(robot):
+    verdict = verdict_on(robot, CommandParameters(mode="position"), on_time, interactions=1)
+    assert not is_calm(verdict)
+    assert verdict.at_limit > 0.5
+
+
+@pytest.mark.skipif("RISEG_ALL_MODES" not in os.environ, reason="RISEG_ALL_MODES=1 measures all modes")
+@pytest.mark.parametrize(
+    ("mode", "rate", "wakes_late", "calm"),
+    [
+        ("position", 200.0, on_time, False),
+        ("position", 200.0, jitter, False),
+        ("position", 1000.0, on_time, True),
+        ("position", 1000.0, jitter, None),
+        ("velocity", 200.0, on_time, True),
+    ],
+)
+def test_every_other_mode(robot, mode, rate, wakes_late, calm):
+    verdict = verdict_on(robot, CommandParameters(mode=mode, rate=rate), wakes_late)
+    assert calm is None or is_calm(verdict) == calm
