@@ -38,26 +38,26 @@ class PandaDriverConfig:
 
     control_mode: str = field(default="velocity", metadata={"choices": ("status_only", "velocity", "position")})
     """The driver's --control_mode."""
-    expire_sec: float = 0.1
+    expire_sec: float = field(default=0.1, metadata={"least": 0.0, "most": 10.0})
     """Age by wall clock at which a command has expired, s."""
-    low_pass_freq: float = 30.0
+    low_pass_freq: float = field(default=30.0, metadata={"least": 1.0, "most": 1000.0})
     """Cut-off of the filter that every command passes, Hz."""
-    startup: float = 1.0
+    startup: float = field(default=1.0, metadata={"least": 0.0, "most": 60.0})
     """From the driver's start to its first status, s: connecting, the download of the robot's model, three
     settings. Assumed; nobody has published a figure."""
     survives_stops: bool = False
     """Whether the driver lives on after a reflex and a user stop, tells of them (robot_mode 4 and 5) and goes
     on when the robot has recovered. The real one does not."""
-    position_noise: float = 1e-4
+    position_noise: float = field(default=1e-4, metadata={"least": 0.0, "most": 0.1})
     """Standard deviation of the measured joint angles, rad. In the printout of an idle robot in the Franka
     Control Interface documentation ("Getting started", echo_robot_state) q - q_d is 0.7e-4 rms, 1.6e-4 at
     most."""
-    velocity_noise: float = 7e-3
+    velocity_noise: float = field(default=7e-3, metadata={"least": 0.0, "most": 1.0})
     """Of the measured joint velocities, rad/s: dq in that printout is 7.3e-3 rms (it is the derivative of the
     noisy angles)."""
-    jitter: float = 0.003
+    jitter: float = field(default=0.003, metadata={"least": 0.0, "most": 0.1})
     """By how much a command's stamp may be off the time that it was planned for, s."""
-    step: float = 5e-4
+    step: float = field(default=5e-4, metadata={"least": 0.0, "most": 1.0})
     """Discontinuity that is always forgiven, rad (in velocity mode 20 times this, rad/s)."""
 
 
@@ -76,7 +76,7 @@ class DriverEnd:
 class PandaDriver:
     """The driver's process, and the robot behind it; `tick` once a millisecond, `receive` in between.
 
-    It runs from the beginning. `end` is None while the process lives; `judge` sees every tick of a controlled
+    It runs from the beginning, with the robot at q [7], rad. `end` is None while the process lives; `judge` sees every tick of a controlled
     robot. `config` is how it was started.
     """
 

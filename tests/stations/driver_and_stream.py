@@ -1,8 +1,9 @@
 """The emulated driver and the command path in one process, on a clock that the test turns: no LCM, no waiting.
 
 What is real here: CommandSession with its doors and its stream, as the process of commands calls it, and
-PandaDriver with its robot, as the emulator does. What is not: the physics (the robot is where it sets itself) and
-the network, which keeps the first message of a channel until it is listened to, as LCM does, and may lose commands.
+PandaDriver with its robot, as the emulator does. What is not: the physics (the robot is where it sets itself)
+and the network (it keeps the first message of a channel until it is listened to, as LCM does, and may lose
+commands).
 """
 
 import numpy as np
