@@ -76,8 +76,8 @@ class DriverEnd:
 class PandaDriver:
     """The driver's process, and the robot behind it; `tick` once a millisecond, `receive` in between.
 
-    It runs from the beginning, with the robot at q [7], rad. `end` is None while the process lives; `judge` sees every tick of a controlled
-    robot. `config` is how it was started.
+    It runs from the beginning, with the robot at q [7], rad. `end` is None while the process lives; `judge`
+    sees every tick of a controlled robot. `config` is how it was started.
     """
 
     def __init__(self, config: PandaDriverConfig, q: NDArray, limits: RobotLimits):
