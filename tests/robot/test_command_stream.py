@@ -259,6 +259,22 @@ def test_after_a_reflex_it_is_silent_and_begins_anew_where_the_arm_is_at_the_ope
     np.testing.assert_allclose(arm.sent()[-1], READY + 0.6, atol=1e-6)
 
 
+@pytest.mark.parametrize("mode", ["position", "velocity"])
+def test_a_word_that_comes_while_the_arm_brakes_waits_until_it_is_at_rest(mode):
+    arm = in_motion(mode)
+    force(arm)
+    arm.run(0.01)
+    arm.status = replace(arm.status, torque_external=np.zeros(7))
+    arm.stream.release()
+    arm.run(6)
+    np.testing.assert_allclose(arm.status.position, READY + 0.6, atol=1e-3)
+    if mode == "position":
+        assert within_limits(arm.sent())
+    else:
+        change = np.abs(np.diff(arm.sent(), axis=0)) / PERIOD
+        assert (change <= CommandLimits().stop_acceleration * PANDA_LIMITS.acceleration + 1e-6).all()
+
+
 def test_an_arm_that_was_carried_away_is_not_driven_back_unasked():
     arm = in_motion()
     reflex(arm)

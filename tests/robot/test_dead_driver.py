@@ -191,3 +191,15 @@ def test_an_arm_that_is_found_elsewhere_after_a_silence_does_not_go_back_by_itse
     lab.run(1.0)
     assert lab.stream.state.cause is Cause.MOVED
     assert not lab.sent()
+
+
+def test_an_arm_that_is_far_away_when_its_status_comes_again_hears_not_even_a_stop():
+    lab = Lab("position")
+    moving(lab)
+    lab.q = lab.q + BY_HAND
+    lab.delay_status(0, gap=0.6)  # unseen, since this process was kept from running
+    lab.step()
+    lab.forget()
+    lab.run(1.0)
+    assert lab.stream.state.cause is Cause.STATUS_ENDED
+    assert not lab.sent()

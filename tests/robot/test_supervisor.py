@@ -16,6 +16,7 @@ from riseg_drake.robot.supervisor import (
     released,
     supervise,
 )
+from tests.docs.pages import CHECKOUT, section, table_rows
 
 GOOD = Observation(
     now=10.0,
@@ -180,3 +181,8 @@ def test_the_end_is_the_end():
     state = ended(Cause.INTERRUPT)
     assert after(state) == state
     assert released(state) == state
+
+
+def test_the_page_has_a_row_for_each_state():
+    rows = table_rows(section(CHECKOUT / "docs" / "hardware.md", "What stops it"))
+    assert [row[0] for row in rows[: len(Mode)]] == [mode.name.lower() for mode in Mode]
