@@ -7,7 +7,9 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.lcm import LcmSubscriberSystem
 
+from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import PandaKinematics, tip_pointing_down
+from riseg_drake.robot.limits import FR3_LIMITS
 from riseg_drake.stations.emulated_arm import EmulatedArm
 from riseg_drake.stations.emulated_camera import EmulatedCamera, full_picture, seen_beside
 from riseg_drake.stations.emulated_drivers import CameraSide, EmulatorConfig, Moment, PandaSide
@@ -202,6 +204,17 @@ def test_a_killed_driver_stays_dead_unless_a_time_was_said(robot):
     robot.say("start", 1100)
     assert robot.say("die 0.2", 1150) == []
     assert {message.robot_mode for message in robot.wait(200)} == {MOVE}
+
+
+def test_an_fr3_keeps_its_own_limits():
+    robot = Robot(one_toy(panda=PandaDescription(robot="fr3")))
+    assert robot.side.arm.driver.robot.limits is FR3_LIMITS
+    assert FR3_LIMITS.contains(robot.start)
+    q = robot.start.copy()
+    q[5] = 0.3  # below the FR3's joint 6, and well within the Panda's; speed towards there ends before
+    robot.move(q, 4.0)
+    assert robot.side.arm.driver.robot.reflex_reason.endswith("velocity_limits_violation")
+    assert robot.side.arm.driver.robot.q_d[5] == pytest.approx(FR3_LIMITS.position_lower[5], abs=0.3)
 
 
 def test_faults_hold_from_the_start_however_many_there_are():
