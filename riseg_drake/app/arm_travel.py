@@ -53,6 +53,7 @@ class WayBack:
     def __init__(
         self, kinematics: PandaKinematics, q_observe: NDArray, limits: SpeedLimits, commands: CommandProcess
     ):
+        """`q_observe` [7], rad, is where the arm looks from; `limits` are of planned motions."""
         self._kinematics, self._q_observe, self._limits = kinematics, q_observe, limits
         self._commands = commands
         self._motion: PiecewisePolynomial | None = None

@@ -29,7 +29,7 @@ from riseg_drake.robot.limits import RobotLimits
 
 _TINY = 1e-3  # rad; no target is taken for one beyond a range for less
 _CREEP = 1e-3  # rad/s; Ruckig wants some speed, also where a joint has none towards the end of its range
-_LOOKS = 10  # at the speeds of a stop
+_LOOKS = 12  # at most, at the speeds of a stop
 
 
 LEAST_MARGIN, MOST_MARGIN = 0.005, 0.5
@@ -255,7 +255,8 @@ class CommandLimiter:
         """Whether no joint is anywhere on the way of a stop faster than it may be there."""
         if self._robot.slowing_down is None:  # the laws that made the step have kept to that
             return True
-        times = np.linspace(0.0, stop.duration, _LOOKS)
+        commands = np.unique(np.linspace(0, np.ceil(stop.duration / self._period), _LOOKS).round())
+        times = np.minimum(self._period * commands, stop.duration)
         position, velocity = np.array([stop.at_time(time)[:2] for time in times]).swapaxes(0, 1)
         lowest, highest = self._velocity_range(position)
         return bool(((lowest <= velocity) & (velocity <= highest)).all())

@@ -21,14 +21,14 @@ FASTEST = 2.175
 class Lab:
     """The driver dies and is started anew at the test's word; while it is dead the arm may be moved by hand."""
 
-    def __init__(self, mode, robot=PANDA_LIMITS, noise=0.0, seed=0):
+    def __init__(self, mode, robot=PANDA_LIMITS, noise=0.0, seed=0, q=READY):
         self.rng, self.noise, self.robot = np.random.default_rng(seed), noise, robot
         tip = TipGeometry(lambda q: np.array([0.5, 0.0, 0.2]), lambda q: np.eye(6, 7))
         self.mode, self.stream = mode, CommandStream(CommandParameters(mode=mode), tip, robot)
         self.now = 1000.0
         self.image_time = self.now
         self.shows = True
-        self.q, self.robot_mode, self.is_alive = READY.copy(), MOVE, True
+        self.q, self.robot_mode, self.is_alive = np.array(q), MOVE, True
         self.v, self.torque = np.zeros(7), np.zeros(7)
         self.status, self.last_stamp = None, None  # the newest that was heard
         self.late_until, self.late_gap = -np.inf, None

@@ -122,9 +122,26 @@ def speed_towards_an_end(robot, end):
         s, ds, dds = (rate * (goal - start) for rate in steady_speed(0.2)(np.array(min(t, 1.0)))[:3])
         limiter.follow(Target(start + s, ds / seconds, dds / seconds**2))
         assert not limiter.held_back
+        assert limiter._stopped_for == 0  # nothing that it meant to do was given up
         positions.append(limiter.position)
     lowest, highest = FR3_LIMITS.velocity_range(np.array(positions)[:-1])
     return (end * np.diff(positions, axis=0) / PERIOD / np.where(end > 0, highest, -lowest)).max(), limiter
+
+
+def test_a_stop_that_a_fast_joint_makes_long_may_not_leave_a_slow_one_too_fast_near_its_end():
+    position = FR3_LIMITS.position_middle.copy()
+    limiter = CommandLimiter(position, FR3_LIMITS)
+    position[4] = FR3_LIMITS.position_upper[4] - 0.04
+    slow = np.zeros(7)
+    slow[4] = 0.97 * CommandLimits().velocity * FR3_LIMITS.velocity_range(position)[1][4]
+    fast = slow.copy()
+    fast[6] = CommandLimits().velocity * FR3_LIMITS.velocity[6]
+    for velocity, expected in ((slow, True), (fast, False)):
+        stop = limiter._stop_from(position, velocity, np.zeros(7))
+        states = np.array([stop.at_time(t)[:2] for t in np.linspace(0, stop.duration, 100)])
+        bounds = CommandLimits().velocity * FR3_LIMITS.velocity_range(states[:, 0])[1]
+        assert (states[:, 1] <= bounds).all() == expected
+        assert limiter._is_slow_enough(stop) == expected
 
 
 @pytest.mark.parametrize("end", [-1, 1])

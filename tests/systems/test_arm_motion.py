@@ -22,11 +22,11 @@ CAMERA = Intrinsics(4, 4, 2.0, 2.0, 1.5, 1.5)
 SECONDS = 1 / 15
 
 
-def push_to(q_there, start_offset=0.0, at=0.0):
+def push_to(q_there, start_offset=0.0, at=0.0, limits=None):
     """A push whose path goes to q_there and back, in no time to speak of."""
-    q_from = Q_OBSERVE + start_offset
-    there = rest_to_rest(np.array([q_from, q_there]), minimum_jerk, SpeedLimits(), PANDA_LIMITS)
-    back = rest_to_rest(np.array([q_there, q_from]), minimum_jerk, SpeedLimits(), PANDA_LIMITS)
+    q_from, limits = Q_OBSERVE + start_offset, limits or SpeedLimits()
+    there = rest_to_rest(np.array([q_from, q_there]), minimum_jerk, limits, PANDA_LIMITS)
+    back = rest_to_rest(np.array([q_there, q_from]), minimum_jerk, limits, PANDA_LIMITS)
     middle = there.end_time()
     back.shiftRight(middle)
     there.ConcatenateInTime(back)
