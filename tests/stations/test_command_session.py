@@ -151,7 +151,7 @@ DANGERS = [reflex, user_stop, force, silence]
 
 
 @pytest.mark.parametrize("danger", DANGERS)
-@pytest.mark.parametrize("ahead", [3600.0, 1.0, 0.05, 0.019, -0.05, -3600.0])
+@pytest.mark.parametrize("ahead", [3600.0, 0.05, 0.019, -3600.0])
 def test_a_status_stamped_at_another_time_hides_no_danger(ahead, danger):
     arm = swinging()
     arm.session.hear_status(arm.status(before=-ahead).encode())
