@@ -77,8 +77,8 @@ class Refusals:
 class StatusDoor:
     """Lets in what the arm's driver can have said. Never raises."""
 
-    def __init__(self, channel: str = "PANDA_STATUS", ahead: float = AHEAD):
-        self._ahead = ahead
+    def __init__(self, channel: str = "PANDA_STATUS", ahead: float = AHEAD, behind: float = BEHIND):
+        self._ahead, self._behind = ahead, behind
         self._newest: ArmStatus | None = None
         self._robot_time = 0.0
         self._contradictions: deque[float] = deque(maxlen=CONTRADICTIONS)
@@ -129,7 +129,7 @@ class StatusDoor:
         return len(self._contradictions) == CONTRADICTIONS and now - self._contradictions[0] <= WITHIN
 
     def _is_in_time(self, time: float, now: float) -> bool:
-        if not _is_of_now(time, now, self._ahead, self.refused):
+        if not _is_of_now(time - now, self._ahead, self._behind, self.refused):
             return False
         if self._newest is None or time > self._newest.time:
             return True
@@ -141,8 +141,8 @@ class StatusDoor:
 class PictureDoor:
     """Lets in what the camera's driver can have sent, as far as its first bytes tell. Never raises."""
 
-    def __init__(self, channel: str = "the camera", ahead: float = AHEAD):
-        self._ahead = ahead
+    def __init__(self, channel: str = "the camera", ahead: float = AHEAD, behind: float = BEHIND):
+        self._ahead, self._behind = ahead, behind
         self.newest = -np.inf
         """When the newest that was let in was sent, s."""
         self.refused = Refusals(channel)
@@ -153,7 +153,7 @@ class PictureDoor:
             self.refused.add("it is no lcmt_image_array")
             return None
         sent = array_time(data) + shift
-        if not _is_of_now(sent, now, self._ahead, self.refused):
+        if not _is_of_now(sent - now, self._ahead, self._behind, self.refused):
             return None
         if sent < self.newest:
             self.refused.add("it came after a later one")
@@ -199,21 +199,13 @@ def _flaw_of_values(message: lcmt_panda_status) -> tuple[str, str] | None:
     return None
 
 
-def _is_of_now(time: float, now: float, ahead: float, refused: Refusals) -> bool:
-    """Whether a stamp can be of about now."""
-    if time - now > ahead:
-        refused.add(
-            "its stamp is ahead of this computer's clock",
-            f"by {time - now:.3f} s; {_ONE_TIME}",
-        )
-        return False
-    if now - time > BEHIND:
-        refused.add(
-            "its stamp is far behind this computer's clock",
-            f"by {now - time:.1f} s; {_ONE_TIME}",
-        )
-        return False
-    return True
+def _is_of_now(since: float, ahead: float, behind: float, refused: Refusals) -> bool:
+    """Whether a stamp, of `since` s after now, can be of about now."""
+    if since > ahead:
+        refused.add("its stamp is ahead of this computer's clock", f"by {since:.3f} s; {_ONE_TIME}")
+    elif since < -behind:
+        refused.add("its stamp is far behind this computer's clock", f"by {-since:.1f} s; {_ONE_TIME}")
+    return -behind <= since <= ahead
 
 
 def _all_within(values: tuple, lower: NDArray, upper: NDArray) -> bool:

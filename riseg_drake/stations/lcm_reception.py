@@ -9,7 +9,7 @@ from pydrake.lcm import DrakeLcmInterface
 
 from riseg_drake.robot.command_stream import ArmStatus
 from riseg_drake.robot.position_history import PositionHistory
-from riseg_drake.stations.arm_messages import AHEAD, PictureDoor, StatusDoor
+from riseg_drake.stations.arm_messages import AHEAD, BEHIND, PictureDoor, StatusDoor
 from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.lcm_channels import LcmConfig
 from riseg_drake.stations.lcm_images import ImageError
@@ -51,9 +51,9 @@ class Reception:
         self._pictures: deque[tuple[float, bytes]] = deque(maxlen=KEPT_PICTURES)
         self._replayed = replayed
         self._log_shift: float | None = None
-        ahead = REPLAYED_AHEAD if replayed else AHEAD
-        self._status_door = StatusDoor(config.status_channel, ahead)
-        self._picture_door = PictureDoor(config.image_channel, ahead)
+        around_now = (REPLAYED_AHEAD, np.inf) if replayed else (AHEAD, BEHIND)  # a log may be played slowly
+        self._status_door = StatusDoor(config.status_channel, *around_now)
+        self._picture_door = PictureDoor(config.image_channel, *around_now)
         self._unusable, self._last_usable = 0, -np.inf
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
