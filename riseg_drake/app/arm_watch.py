@@ -9,7 +9,7 @@ from riseg_drake.app.arm_travel import TravelError, WayBack
 from riseg_drake.app.diagram import WiredDiagram
 from riseg_drake.app.interactions import Progress
 from riseg_drake.app.terminal_operator import TerminalOperator
-from riseg_drake.pushing.push import ArmPhase, Push
+from riseg_drake.pushing.push import NO_PUSH, ArmPhase, Push
 from riseg_drake.robot.supervisor import Cause, Mode
 from riseg_drake.stations.command_process import CommandProcess
 from riseg_drake.stations.command_session import StreamReport
@@ -38,7 +38,7 @@ class ArmWatch:
         """`off_path` is how far from its path the arm may go on with it, rad."""
         self._wired, self._commands, self._operator, self._progress = wired, commands, operator, progress
         self._way_back, self._off_path = way_back, off_path
-        self._push: Push | None = None
+        self._push = NO_PUSH
         self._next = 0.0
         self._said = Mode.FOLLOWING
         self._told: dict[Cause, float] = {}
@@ -74,8 +74,8 @@ class ArmWatch:
             self._operator.tell(f"paused: {cause.value}{hint}")
 
     def _announce_contact(self, context: Context) -> None:
-        push: Push | None = self._wired.read("active_push", context)
-        if push is self._push or push is None or push.path is None:
+        push: Push = self._wired.read("active_push", context)
+        if push is self._push or push.path is None:
             return
         if self._wired.phase(context) not in (ArmPhase.APPROACH, ArmPhase.PUSH):
             return

@@ -32,7 +32,7 @@ from riseg_drake.stations.hardware import HardwareStation, TargetSink
 from riseg_drake.stations.lcm_reception import Reception
 from riseg_drake.stations.simulated import SimulatedStation, SimulatedStationConfig, start_position
 from riseg_drake.systems.arm_motion import ArmMotion, Permission
-from riseg_drake.systems.mask_refiner import MaskRefiner, RefinedMask
+from riseg_drake.systems.mask_refiner import NO_REFINED_MASK, MaskRefiner, RefinedMask
 from riseg_drake.systems.push_planner import PushPlanner
 
 
@@ -93,8 +93,8 @@ class WiredDiagram:
             self._ports[name] = self.diagram.GetOutputPort(name)
         return self._ports[name]
 
-    def pair(self, context: Context) -> FramePair | None:
-        """The frames of t-1 and t; None before the first."""
+    def pair(self, context: Context) -> FramePair:
+        """The frames of t-1 and t; NO_PAIR before the first."""
         return self.read("pair", context)
 
     def segmentation(self, context: Context) -> Segmentation:
@@ -105,9 +105,9 @@ class WiredDiagram:
         """L_t [H, W]."""
         return self.read("mask", context)
 
-    def refined(self, context: Context) -> RefinedMask | None:
-        """The newest mask with sharper outlines; None before the first, and where nothing refines."""
-        return None if self._refiner is None else self.read("refined", context)
+    def refined(self, context: Context) -> RefinedMask:
+        """The newest mask with sharper outlines; NO_REFINED_MASK before the first and where nothing refines."""
+        return NO_REFINED_MASK if self._refiner is None else self.read("refined", context)
 
     def finish_refinement(self, context: Context) -> list[RefinedMask]:
         """Wait for the outlines that are still being worked on; they come oldest first."""

@@ -14,7 +14,7 @@ from riseg_drake.app.output import Step
 from riseg_drake.evaluation.disturbance import Disturbance, motion_between, object_at
 from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.rgbd import Frame
-from riseg_drake.pushing.push import ArmPhase, Push
+from riseg_drake.pushing.push import NO_PUSH, ArmPhase, Push
 from riseg_drake.systems.stage_clock import StageClock
 
 Listener = Callable[[Frame, Context], None]
@@ -150,9 +150,8 @@ class _News:
                 return EventStatus.ReachedTermination(self._wired.diagram, "somebody wants to look")
             return EventStatus.DidNothing()
         if sequence != self._sequence:
-            pair = self._wired.pair(context)
-            assert pair is not None
-            self.frame, self.mask_is_new, self._sequence = pair.current, True, sequence
+            self.frame = self._wired.pair(context).current
+            self.mask_is_new, self._sequence = True, sequence
         self.phase = phase
         return EventStatus.ReachedTermination(self._wired.diagram, "news")
 
@@ -209,6 +208,6 @@ class _Book:
 
     def _next_pushed(self, frame: Frame, truth: Truth) -> str | None:
         """The object that the push now beginning goes for."""
-        push: Push | None = self._wired.read("active_push", self._context)
-        object_id = None if push is None else object_at(push.p_WB, frame, truth.labels)
+        push: Push = self._wired.read("active_push", self._context)
+        object_id = None if push is NO_PUSH else object_at(push.p_WB, frame, truth.labels)
         return None if object_id is None else truth.names[object_id]

@@ -7,17 +7,17 @@ recording keeps when it is visible.
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.common.value import Value
+from pydrake.common.value import AbstractValue
 from pydrake.geometry import Cylinder, Meshcat, MeshcatCone, Rgba
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.perception import BaseField, Fields, PointCloud
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
 from riseg_drake.geometry.camera import back_project
-from riseg_drake.geometry.rgbd import Frame, FramePair
+from riseg_drake.geometry.rgbd import NO_PAIR, Frame, FramePair
 from riseg_drake.pictures.object_colors import object_colors
-from riseg_drake.pushing.push import Push
-from riseg_drake.segmentation.segment import Segmentation
+from riseg_drake.pushing.push import NO_PUSH, Push
+from riseg_drake.segmentation.segment import Segmentation, nothing_segmented
 
 POINT_STRIDE = 3
 """Every third pixel in both directions becomes a point: 34 thousand at 640x480."""
@@ -31,7 +31,7 @@ ARROW_COLOR = Rgba(0.84, 0.37, 0.0, 1.0)
 class MeshcatView(LeafSystem):
     """Draws the point cloud coloured by object id, and the push that is under way as an arrow.
 
-    Inputs: `pair` (FramePair), `segmentation` (Segmentation), `active_push` (Push or None),
+    Inputs: `pair` (FramePair), `segmentation` (Segmentation), `active_push` (Push),
     `interaction_step` (int). Looks every `period` s.
     """
 
@@ -41,26 +41,31 @@ class MeshcatView(LeafSystem):
         self._meshcat = meshcat
         self._visible: dict[str, str] = {}  # by kind ("points", "push"), the path that is shown now
         self._sequence = -1
-        self._push: Push | None = None
-        for name in ("pair", "segmentation", "active_push", "interaction_step"):
-            self.DeclareAbstractInputPort(name, Value[object]())
+        self._push = NO_PUSH
+        for name, model in (
+            ("pair", NO_PAIR),
+            ("segmentation", nothing_segmented((0, 0))),
+            ("active_push", NO_PUSH),
+            ("interaction_step", 0),
+        ):
+            self.DeclareAbstractInputPort(name, AbstractValue.Make(model))
         self.DeclarePeriodicPublishEvent(period, 0.0, self._publish)
 
     def _publish(self, context: Context) -> EventStatus:
-        pair: FramePair | None = self.GetInputPort("pair").Eval(context)
+        pair: FramePair = self.GetInputPort("pair").Eval(context)
         segmentation: Segmentation = self.GetInputPort("segmentation").Eval(context)
         step: int = self.GetInputPort("interaction_step").Eval(context)
         # At a tick both are of the frame before; a pair without its mask yet is left for the next tick.
-        if pair is not None and self._sequence != pair.current.sequence == segmentation.sequence:
+        if self._sequence != pair.current.sequence == segmentation.sequence:
             self._sequence = segmentation.sequence
             path = f"/riseg/points/step_{step}"
             self._meshcat.SetObject(path, object_cloud(pair.current, segmentation.mask), POINT_SIZE)
             self._turn_to("points", path, context.get_time())
-        push: Push | None = self.GetInputPort("active_push").Eval(context)
+        push: Push = self.GetInputPort("active_push").Eval(context)
         if push is not self._push:
             self._push = push
-            path = f"/riseg/push/step_{step}" if push is not None else ""
-            if push is not None:
+            path = f"/riseg/push/step_{step}" if push is not NO_PUSH else ""
+            if push is not NO_PUSH:
                 draw_arrow(self._meshcat, path, push)
             self._turn_to("push", path, context.get_time())
         return EventStatus.Succeeded()

@@ -23,7 +23,7 @@ from riseg_drake.app.tables import score_table, stage_table
 from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.recording.whole_file import write_text
-from riseg_drake.systems.mask_refiner import RefinedMask
+from riseg_drake.systems.mask_refiner import NO_REFINED_MASK, RefinedMask
 from riseg_drake.systems.stage_clock import StageClock
 
 
@@ -163,14 +163,14 @@ class RefinedSteps:
 
     def __init__(self, wired: WiredDiagram, folder: RunFolder, steps: list[Step]):
         self._wired, self._folder, self._steps = wired, folder, steps
-        self._last: RefinedMask | None = None
+        self._last = NO_REFINED_MASK
         self._context: Context | None = None
 
     def look(self, _: Frame, context: Context) -> None:
         """A listener: see whether the worker is done with something."""
         self._context = context
         refined = self._wired.refined(context)
-        if refined is not None and refined is not self._last:
+        if refined is not self._last:
             self._last = refined
             self._add([refined])
 

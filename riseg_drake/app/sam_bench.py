@@ -9,7 +9,7 @@ from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.common.value import Value
+from pydrake.common.value import AbstractValue
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from rich.console import Console
@@ -26,7 +26,7 @@ from riseg_drake.learned.prompts import PromptedSegmenter, prompt_of_mask
 from riseg_drake.learned.sam import SamParameters, SamSegmenter, load_sam
 from riseg_drake.pushing.push import ArmPhase
 from riseg_drake.robot.kinematics import PandaKinematics
-from riseg_drake.systems.mask_refiner import MaskRefiner
+from riseg_drake.systems.mask_refiner import NO_REFINED_MASK, MaskRefiner
 
 OBJECTS = 6
 """So many objects are asked about in one image."""
@@ -81,12 +81,12 @@ def _frame_times(
     simulator = Simulator(diagram)
     context = simulator.get_mutable_context()
     at_refiner = refiner.GetMyMutableContextFromRoot(context)
-    refiner.GetInputPort("phase").FixValue(at_refiner, Value[object](ArmPhase.PUSH))
-    demand, refined, times = 0, None, []
+    refiner.GetInputPort("phase").FixValue(at_refiner, AbstractValue.Make(ArmPhase.PUSH))
+    demand, refined, times = 0, NO_REFINED_MASK, []
     for tick, now in enumerate(images):
         for name, value in now.items():
             diagram.GetInputPort(name).FixValue(context, value)
-        refiner.GetInputPort("demand").FixValue(at_refiner, Value[object](demand))
+        refiner.GetInputPort("demand").FixValue(at_refiner, AbstractValue.Make(demand))
         start = perf_counter()
         simulator.AdvanceTo((tick + 1) * period)
         times.append(perf_counter() - start)

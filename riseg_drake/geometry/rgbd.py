@@ -14,7 +14,8 @@ from riseg_drake.geometry.camera import Intrinsics
 class Immutable:
     """Base of values that nobody changes once they are made, so that a copy may be the thing itself.
 
-    Drake copies the abstract state at every unrestricted update; images should not be copied with it.
+    Drake copies the abstract state at every unrestricted update; images should not be copied with it. And
+    what stands for nothing (NO_FRAME and the like) is told by `is`, through whatever ports it went.
     """
 
     def __deepcopy__(self, memo: dict) -> Self:
@@ -63,6 +64,20 @@ class Frame(Immutable):
         return np.where(self.robot, np.float32(0), self.depth)
 
 
+NO_FRAME = Frame(
+    sequence=-1,
+    time=-np.inf,
+    intrinsics=Intrinsics(width=0, height=0, fx=1.0, fy=1.0, cx=0.0, cy=0.0),
+    color=np.zeros((0, 0, 3), np.uint8),
+    depth=np.zeros((0, 0), np.float32),
+    X_WC=np.eye(4),
+    robot=np.zeros((0, 0), bool),
+)
+"""What there is before the first image: no pixels, older than any frame."""
+NO_MASK = np.zeros((0, 0), np.uint16)
+"""The mask of no pixels."""
+
+
 @dataclass(frozen=True)
 class FramePair(Immutable):
     """(I_t-1, I_t) with their kinematics; `reference` is the paper's t-1, `current` its t."""
@@ -76,6 +91,10 @@ class FramePair(Immutable):
     def X_C1C0(self) -> NDArray[np.float64]:
         """The paper's camT_{t-1,t}, [4, 4]: takes points of the camera at t-1 to the camera at t."""
         return np.linalg.inv(self.current.X_WC) @ self.reference.X_WC
+
+
+NO_PAIR = FramePair(NO_FRAME, NO_FRAME)
+"""What there is before the first frame."""
 
 
 def smooth_gray(color: NDArray[np.uint8]) -> NDArray[np.float32]:

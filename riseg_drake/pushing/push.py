@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.geometry.rgbd import Immutable
+
 if TYPE_CHECKING:
     from riseg_drake.pushing.push_path import PushPath
 
@@ -27,7 +29,7 @@ class ArmPhase(Enum):
 
 
 @dataclass(frozen=True)
-class Push:
+class Push(Immutable):
     """a_i = (b, bc, d_push), as the robot will do it."""
 
     p_WE: NDArray[np.float64]
@@ -52,3 +54,18 @@ class Push:
     """What the ranking says, less is better."""
     path: "PushPath | None" = field(default=None, repr=False)
     """The arm's way there and back; None until it has been planned."""
+
+
+NO_PUSH = Push(
+    p_WE=np.zeros(3),
+    tip_height=0.0,
+    direction_W=np.zeros(2),
+    p_WB=np.zeros(3),
+    length=0.0,
+    d_push=0.0,
+    center_W=np.zeros(2),
+    cluster_W=np.zeros((0, 2)),
+    tallest=0.0,
+    cost=np.inf,
+)
+"""The paper's a_i = null, where a push goes through ports."""

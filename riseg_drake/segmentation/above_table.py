@@ -63,6 +63,16 @@ class AboveTable(Immutable):
         return intrinsics.fx / self.distance
 
 
+NOTHING_ABOVE_TABLE = AboveTable(
+    mask=np.zeros((0, 0), bool),
+    height=np.zeros((0, 0), np.float32),
+    plane_W=np.array([0.0, 0.0, 1.0, 0.0]),
+    depth_noise=_DEPTH_NOISE_MIN,
+    distance=1.0,
+)
+"""What stands on the table before the first frame."""
+
+
 def objects_above_table(frame: Frame, parameters: AboveTableParameters) -> AboveTable:
     """Fit the table by RANSAC and mark what stands on it.
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from riseg_drake.geometry.rgbd import Frame, FramePair
+from riseg_drake.geometry.rgbd import NO_PAIR, Frame, FramePair
 from riseg_drake.geometry.se3 import log_se3
 
 
@@ -33,20 +33,18 @@ class FramePairParameters:
     """s; while nothing moves the reference is at most that old."""
 
 
-def next_pair(
-    pair: FramePair | None, frame: Frame, flow_span: float, parameters: FramePairParameters
-) -> FramePair:
+def next_pair(pair: FramePair, frame: Frame, flow_span: float, parameters: FramePairParameters) -> FramePair:
     """The pair for a new frame.
 
     Args:
-        pair: the pair before, None at the first frame (which is then paired with itself).
+        pair: the pair before, NO_PAIR at the first frame (which is then paired with itself).
         frame: the newest frame.
         flow_span: effective flow found in the pair before, pixels.
         parameters: see there; ValueError for an unknown kind.
     """
     if parameters.kind not in ("motion", "consecutive"):
         raise ValueError(f"no frame pairs {parameters.kind!r}: choose motion or consecutive")
-    if pair is None:
+    if pair is NO_PAIR:
         return FramePair(frame, frame)
     if parameters.kind == "consecutive":
         return FramePair(pair.current, frame)

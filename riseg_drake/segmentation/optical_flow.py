@@ -22,6 +22,8 @@ DIS_PRESETS = {
     "medium": cv2.DISOPTICAL_FLOW_PRESET_MEDIUM,
 }
 
+NO_FLOW = np.zeros((0, 0, 2), np.float32)
+"""The flow of no pixels: E_t and O_t before the first pair."""
 
 _MARGIN = 0.03
 """Share of the image's width by which flow is worked out around what stands on the table: objects' own

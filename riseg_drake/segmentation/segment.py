@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import back_project, bounding_region, pixel_grid
-from riseg_drake.geometry.rgbd import FramePair, Immutable
+from riseg_drake.geometry.rgbd import NO_PAIR, FramePair, Immutable
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.alignment import align_motions
 from riseg_drake.segmentation.association import (
@@ -76,8 +76,8 @@ class Segmentation(Immutable):
     """Motion [4, 4] in C0 since the reference frame, of the ids that moved."""
     memory: Memory
     """Points of objects that the reference frame does not see, as of its time."""
-    pair: FramePair | None
-    """The last pair, whose current frame `label` belongs to; None before the first."""
+    pair: FramePair
+    """The last pair, whose current frame `label` belongs to; NO_PAIR before the first."""
     born: dict[int, int]
     doubtful: frozenset[int]
     """Ids that may be two objects, see doubt.py."""
@@ -116,7 +116,7 @@ def nothing_segmented(shape: tuple[int, int]) -> Segmentation:
         decided=empty,
         motion_of={},
         memory={},
-        pair=None,
+        pair=NO_PAIR,
         born={},
         doubtful=frozenset(),
         next_id=1,
@@ -209,7 +209,7 @@ def _renew_reference(
     if before.sequence != pair.reference.sequence or label.shape != above_0.mask.shape:
         label = np.where(above_0.mask, UNKNOWN, np.uint16(0))
     memory: Memory = {}
-    if parameters.memory and before.pair is not None:
+    if parameters.memory and before.pair is not NO_PAIR:
         memory = remember(before.memory, before.pair, before.decided, before.motion_of)
     return replace(
         before,

@@ -6,11 +6,11 @@ know where the arm is now, which is the process that sends commands, listens to 
 """
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.common.value import AbstractValue, Value
+from pydrake.common.value import AbstractValue
 from pydrake.geometry import Meshcat, MeshcatVisualizer, SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import (
@@ -27,6 +27,7 @@ from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
 
 from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.geometry.rgbd import Immutable
 from riseg_drake.robot.command_stream import CommandParameters
 from riseg_drake.robot.description import PandaDescription, add_panda
 from riseg_drake.robot.limits import check_start_position
@@ -184,8 +185,8 @@ class Targets(LeafSystem):
 
 
 @dataclass(frozen=True)
-class Sight:
-    """A picture with the arm at the time it was taken. Never changed, only replaced."""
+class Sight(Immutable):
+    """A picture with the arm at the time it was taken."""
 
     color: ImageRgba8U
     depth: ImageDepth32F
@@ -198,8 +199,9 @@ class Sight:
     velocity: NDArray[np.float64]
     """rad/s [7]"""
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> "Sight":
-        return self
+
+NO_SIGHT = Sight(ImageRgba8U(), ImageDepth32F(), -1.0, -np.inf, np.zeros(7), np.zeros(7))
+"""What there is before the first picture."""
 
 
 def newest_sight(reception: Reception, config: HardwareCameraConfig, after: float) -> Sight | None:
@@ -249,18 +251,17 @@ class LcmView(LeafSystem):
         super().__init__()
         self.set_name("drivers")
         self._config, self._reception = config, reception
-        nothing = Sight(ImageRgba8U(), ImageDepth32F(), -1.0, -np.inf, np.zeros(7), np.zeros(7))
-        self._state = self.DeclareAbstractState(Value[object](nothing))
+        self._state = self.DeclareAbstractState(AbstractValue.Make(NO_SIGHT))
         ticket = {self.abstract_state_ticket(self._state)}
         self.DeclareAbstractOutputPort(
             "color_image",
-            lambda: AbstractValue.Make(ImageRgba8U()),
+            AbstractValue.Make(NO_SIGHT.color).Clone,
             lambda context, output: output.set_value(self._shown(context).color),
             ticket,
         )
         self.DeclareAbstractOutputPort(
             "depth_image",
-            lambda: AbstractValue.Make(ImageDepth32F()),
+            AbstractValue.Make(NO_SIGHT.depth).Clone,
             lambda context, output: output.set_value(self._shown(context).depth),
             ticket,
         )

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.common.value import AbstractValue, Value
+from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
 from pydrake.trajectories import PiecewisePolynomial
 
-from riseg_drake.geometry.rgbd import FramePair
-from riseg_drake.pushing.push import ArmPhase, Push
+from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR, FramePair, Immutable
+from riseg_drake.pushing.push import NO_PUSH, ArmPhase, Push
 from riseg_drake.pushing.time_law import minimum_jerk
 from riseg_drake.pushing.tried_pushes import SegmentedSoFar, TriedPush, segmented_so_far
 from riseg_drake.systems.memory import replace_memory
@@ -50,13 +50,13 @@ class ArmMotionParameters:
 
 
 @dataclass(frozen=True)
-class _Memory:
+class _Memory(Immutable):
     """All that ArmMotion remembers. Never changed, only replaced."""
 
     interaction_step: int = 0
-    push: Push | None = None
-    """What the arm is doing now; None at the observation posture."""
-    proposed: Push | None = None
+    push: Push = NO_PUSH
+    """What the arm is doing now; NO_PUSH at the observation posture."""
+    proposed: Push = NO_PUSH
     """What it would do next, and has not been permitted yet."""
     way_back: PiecewisePolynomial | None = None
     """What it does instead: it was moved by hand, and comes back to the observation posture."""
@@ -70,7 +70,7 @@ class _Memory:
     """Since when the arm has been at rest at the observation posture, s; None while it is not."""
     segmented_before: SegmentedSoFar | None = None
     """What was segmented before the last push."""
-    unjudged: Push | None = None
+    unjudged: Push = NO_PUSH
     """A push that is over but of which it is not known yet what it brought."""
     tried: tuple[TriedPush, ...] = ()
     asked: int = -1
@@ -78,16 +78,17 @@ class _Memory:
     nulls: int = 0
     done: bool = False
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> "_Memory":
-        # The framework copies the state at each event; what never changes needs no copy.
-        return self
+    @property
+    def active_push(self) -> Push:
+        """The push that is being done, or waits for permission."""
+        return self.proposed if self.push is NO_PUSH else self.push
 
 
 class ArmMotion(LeafSystem):
     """Turns pushes into joint angles, and asks for the next push when it is time.
 
     Inputs:
-        push: Push with a path, or None; evaluated only when the arm rests and sees, once for a frame.
+        push: Push with a path, or NO_PUSH; evaluated only when the arm rests and sees, once for a frame.
         pair: FramePair; tells when the frame was taken that push and mask belong to.
         mask: L_t of the pair's current frame, to tell whether a push brought anything.
         position_measured: the arm's joint angles [7], rad.
@@ -97,7 +98,7 @@ class ArmMotion(LeafSystem):
             beginning of a way back.
         phase: ArmPhase.
         interaction_step: int, how many pushes are over.
-        active_push: the Push that is being done, or waits for permission, or None.
+        active_push: the Push that is being done, or waits for permission, or NO_PUSH.
         tried_pushes: tuple of TriedPush.
 
     `permit` is asked about every push, again and again while it says WAIT; without it each is done.
@@ -125,26 +126,25 @@ class ArmMotion(LeafSystem):
         self._permit = permit
         self._done_until = done_until
         self._way_back = way_back
-        anything = Value[object](None)
-        self._push = self.DeclareAbstractInputPort("push", anything)
-        self._pair = self.DeclareAbstractInputPort("pair", anything)
-        self._mask = self.DeclareAbstractInputPort("mask", anything)
+        self._push = self.DeclareAbstractInputPort("push", AbstractValue.Make(NO_PUSH))
+        self._pair = self.DeclareAbstractInputPort("pair", AbstractValue.Make(NO_PAIR))
+        self._mask = self.DeclareAbstractInputPort("mask", AbstractValue.Make(NO_MASK))
         self._measured = self.DeclareVectorInputPort("position_measured", 7)
-        self._memory = self.DeclareAbstractState(Value[object](_Memory()))
+        self._memory = self.DeclareAbstractState(AbstractValue.Make(_Memory()))
         state = {self.abstract_state_ticket(self._memory)}
         with_time = state | {self.time_ticket()}
         self.DeclareVectorOutputPort("position", 7, self._calc_position, with_time)
-        self._declare("phase", self._calc_phase, with_time)
-        self._declare("interaction_step", lambda m, t: m.interaction_step, state)
-        self._declare("active_push", lambda m, t: m.push or m.proposed, state)
-        self._declare("tried_pushes", lambda m, t: m.tried, state)
+        self._declare("phase", ArmPhase.OBSERVE, self._calc_phase, with_time)
+        self._declare("interaction_step", 0, lambda m, t: m.interaction_step, state)
+        self._declare("active_push", NO_PUSH, lambda m, t: m.active_push, state)
+        self._declare("tried_pushes", (), lambda m, t: m.tried, state)
         self.DeclarePeriodicUnrestrictedUpdateEvent(self._parameters.period, 0.0, self._update)
 
-    def _declare(self, name: str, read: Any, prerequisites: set) -> None:
+    def _declare(self, name: str, model: Any, read: Any, prerequisites: set) -> None:
         def calc(context: Context, output: AbstractValue) -> None:
             output.set_value(read(self._recall(context), context.get_time()))
 
-        self.DeclareAbstractOutputPort(name, lambda: Value[object](None), calc, prerequisites)
+        self.DeclareAbstractOutputPort(name, AbstractValue.Make(model).Clone, calc, prerequisites)
 
     def _recall(self, context: Context) -> _Memory:
         return context.get_abstract_state(int(self._memory)).get_value()
@@ -156,7 +156,7 @@ class ArmMotion(LeafSystem):
         """The joint angles [7] to command at a time."""
         if memory.way_back is not None:
             return memory.way_back.value(min(time - memory.start_time, memory.way_back.end_time()))[:, 0]
-        if memory.push is None or memory.push.path is None:
+        if memory.push.path is None:
             return self._q_observe
         path, since = memory.push.path, time - memory.start_time
         to_an_end = min(since, path.duration - since) / self._parameters.fade_time
@@ -166,7 +166,7 @@ class ArmMotion(LeafSystem):
     def _calc_phase(self, memory: _Memory, time: float) -> ArmPhase:
         if memory.done:
             return ArmPhase.DONE
-        if memory.push is None or memory.push.path is None:
+        if memory.push.path is None:
             return ArmPhase.OBSERVE
         if memory.way_back is not None:
             return ArmPhase.RETREAT
@@ -183,10 +183,10 @@ class ArmMotion(LeafSystem):
             return memory
         way_back = self._way_back() if self._way_back is not None else None
         if way_back is not None:
-            return replace(memory, way_back=way_back, start_time=time, proposed=None, rest_since=None)
-        if memory.push is not None or memory.way_back is not None:
+            return replace(memory, way_back=way_back, start_time=time, proposed=NO_PUSH, rest_since=None)
+        if memory.push is not NO_PUSH or memory.way_back is not None:
             return self._after_motion(memory, time)
-        if memory.proposed is not None:
+        if memory.proposed is not NO_PUSH:
             return self._ask(memory, time)
 
         error = np.abs(self._measured.Eval(context) - self._q_observe).max()
@@ -195,18 +195,18 @@ class ArmMotion(LeafSystem):
             return memory if memory.rest_since is None else replace(memory, rest_since=None)
         if memory.rest_since is None:
             return replace(memory, rest_since=time)
-        pair: FramePair | None = self._pair.Eval(context)
-        if pair is None or pair.current.time < memory.rest_since + parameters.settle_time:
+        pair: FramePair = self._pair.Eval(context)
+        if pair is NO_PAIR or pair.current.time < memory.rest_since + parameters.settle_time:
             return memory
-        if memory.unjudged is not None:
+        if memory.unjudged is not NO_PUSH:
             return self._judge(memory, pair, context)
         if memory.interaction_step >= parameters.most_interactions:
             return replace(memory, done=True)
         if memory.asked == pair.current.sequence:
             return memory
 
-        push: Push | None = self._push.Eval(context)
-        if push is None:
+        push: Push = self._push.Eval(context)
+        if push is NO_PUSH:
             nulls = memory.nulls + 1
             return replace(
                 memory, asked=pair.current.sequence, nulls=nulls, done=nulls >= parameters.null_frames
@@ -223,12 +223,11 @@ class ArmMotion(LeafSystem):
     def _ask(self, memory: _Memory, time: float) -> _Memory:
         """Begin with the proposed push, if that is permitted."""
         push = memory.proposed
-        assert push is not None
         match Permission.DO if self._permit is None else self._permit(push):
             case Permission.DO:
                 return replace(
                     memory,
-                    proposed=None,
+                    proposed=NO_PUSH,
                     push=push,
                     start_time=time,
                     offset=self._offset_from(push),
@@ -236,34 +235,32 @@ class ArmMotion(LeafSystem):
                 )
             case Permission.SKIP:
                 tried = TriedPush(push.p_WB, push.direction_W, changed=False)
-                return replace(memory, proposed=None, tried=(*memory.tried, tried))
+                return replace(memory, proposed=NO_PUSH, tried=(*memory.tried, tried))
             case Permission.END:
-                return replace(memory, proposed=None, done=True)
+                return replace(memory, proposed=NO_PUSH, done=True)
         return memory
 
     def _after_motion(self, memory: _Memory, time: float) -> _Memory:
         if memory.way_back is not None:
             duration = memory.way_back.end_time()
         else:
-            assert memory.push is not None
             assert memory.push.path is not None
             duration = memory.push.path.duration
         if time < memory.start_time + duration:
             return memory
-        after = replace(memory, push=None, way_back=None, end_time=time)
-        if memory.push is None:
+        after = replace(memory, push=NO_PUSH, way_back=None, end_time=time)
+        if memory.push is NO_PUSH:
             return after
         return replace(after, interaction_step=memory.interaction_step + 1, unjudged=memory.push)
 
     def _judge(self, memory: _Memory, pair: FramePair, context: Context) -> _Memory:
         """Remember what the last push brought."""
-        assert memory.unjudged is not None
         assert memory.segmented_before is not None
         changed = self._segmented(pair, context).differs_from(
             memory.segmented_before, self._parameters.unchanged_area
         )
         tried = TriedPush(memory.unjudged.p_WB, memory.unjudged.direction_W, changed)
-        return replace(memory, tried=(*memory.tried, tried), unjudged=None)
+        return replace(memory, tried=(*memory.tried, tried), unjudged=NO_PUSH)
 
     def _segmented(self, pair: FramePair, context: Context) -> SegmentedSoFar:
         frame = pair.current

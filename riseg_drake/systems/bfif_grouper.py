@@ -4,8 +4,10 @@ import numpy as np
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from riseg_drake.geometry.rgbd import FramePair
-from riseg_drake.segmentation.bfif import BFIFParameters, group_body_frames
+from riseg_drake.geometry.rgbd import NO_PAIR, FramePair
+from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
+from riseg_drake.segmentation.bfif import BFIFParameters, group_body_frames, no_groups
+from riseg_drake.segmentation.optical_flow import NO_FLOW
 from riseg_drake.systems.stage_clock import timed
 
 
@@ -31,12 +33,17 @@ class BFIFGrouper(LeafSystem):
         self.set_name("BFIFGrouper")
         self._parameters, self._seed = parameters or BFIFParameters(), seed
         self._pair, self._expected_flow, self._optical_flow, self._above = (
-            self.DeclareAbstractInputPort(name, AbstractValue.Make(object()))
-            for name in ("pair", "expected_flow", "optical_flow", "above_table")
+            self.DeclareAbstractInputPort(name, AbstractValue.Make(model))
+            for name, model in (
+                ("pair", NO_PAIR),
+                ("expected_flow", NO_FLOW),
+                ("optical_flow", NO_FLOW),
+                ("above_table", NOTHING_ABOVE_TABLE),
+            )
         )
         self._groups = self.DeclareAbstractOutputPort(
             "groups",
-            lambda: AbstractValue.Make(object()),
+            AbstractValue.Make(no_groups()).Clone,
             self._calc_groups,
             prerequisites_of_calc={self.all_input_ports_ticket()},
         )
@@ -47,6 +54,9 @@ class BFIFGrouper(LeafSystem):
     @timed
     def _calc_groups(self, context: Context, output: AbstractValue) -> None:
         pair: FramePair = self._pair.Eval(context)
+        if pair is NO_PAIR:
+            output.set_value(no_groups())
+            return
         output.set_value(
             group_body_frames(
                 pair,

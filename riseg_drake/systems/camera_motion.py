@@ -3,9 +3,11 @@
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, LeafSystem
 
-from riseg_drake.geometry.rgbd import FramePair
-from riseg_drake.segmentation.camera_motion import CameraMotionParameters, settled_pair
+from riseg_drake.geometry.rgbd import NO_PAIR, FramePair
+from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
+from riseg_drake.segmentation.camera_motion import CameraMotionParameters, PoseError, settled_pair
 from riseg_drake.segmentation.noise import MeasurementNoise
+from riseg_drake.segmentation.optical_flow import NO_FLOW
 from riseg_drake.systems.stage_clock import timed
 
 
@@ -13,14 +15,14 @@ class CameraMotion(LeafSystem):
     """What of the poses of a pair can be believed.
 
     Inputs:
-        pair: FramePair, or None.
+        pair: FramePair.
         optical_flow: O_t [H, W, 2], pixels.
         above_table_reference: AboveTable at t-1.
         above_table: AboveTable at t.
         pose_error: PoseError.
 
     Outputs:
-        pair: FramePair, the same where the poses are exact; None without one.
+        pair: FramePair, the same where the poses are exact.
     """
 
     def __init__(
@@ -30,21 +32,26 @@ class CameraMotion(LeafSystem):
         self.set_name("CameraMotion")
         self._parameters, self._noise = parameters or CameraMotionParameters(), noise or MeasurementNoise()
         self._stages = [
-            self.DeclareAbstractInputPort(name, AbstractValue.Make(object()))
-            for name in ("pair", "optical_flow", "above_table_reference", "above_table", "pose_error")
+            self.DeclareAbstractInputPort(name, AbstractValue.Make(model))
+            for name, model in (
+                ("pair", NO_PAIR),
+                ("optical_flow", NO_FLOW),
+                ("above_table_reference", NOTHING_ABOVE_TABLE),
+                ("above_table", NOTHING_ABOVE_TABLE),
+                ("pose_error", PoseError()),
+            )
         ]
         self.DeclareAbstractOutputPort(
             "pair",
-            lambda: AbstractValue.Make(object()),
+            AbstractValue.Make(NO_PAIR).Clone,
             self._calc_pair,
             prerequisites_of_calc={self.all_input_ports_ticket()},
         )
 
-    def _calc_pair(self, context: Context, output: AbstractValue) -> None:
-        pair: FramePair | None = self._stages[0].Eval(context)
-        output.set_value(None if pair is None else self._settle(context, pair))
-
     @timed
-    def _settle(self, context: Context, pair: FramePair) -> FramePair:
-        optical_flow, above_0, above_1, error = (stage.Eval(context) for stage in self._stages[1:])
-        return settled_pair(pair, optical_flow, above_0, above_1, error, self._noise, self._parameters)
+    def _calc_pair(self, context: Context, output: AbstractValue) -> None:
+        pair: FramePair
+        pair, optical_flow, above_0, above_1, error = (stage.Eval(context) for stage in self._stages)
+        if pair is not NO_PAIR:
+            pair = settled_pair(pair, optical_flow, above_0, above_1, error, self._noise, self._parameters)
+        output.set_value(pair)

@@ -3,8 +3,9 @@
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, LeafSystem
 
-from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.geometry.rgbd import NO_PAIR, FramePair
 from riseg_drake.segmentation.expected_flow import expected_flow
+from riseg_drake.segmentation.optical_flow import NO_FLOW
 from riseg_drake.systems.stage_clock import timed
 
 
@@ -21,10 +22,10 @@ class ExpectedFlow(LeafSystem):
     def __init__(self) -> None:
         super().__init__()
         self.set_name("ExpectedFlow")
-        self._pair = self.DeclareAbstractInputPort("pair", AbstractValue.Make(object()))
+        self._pair = self.DeclareAbstractInputPort("pair", AbstractValue.Make(NO_PAIR))
         self.DeclareAbstractOutputPort(
             "expected_flow",
-            lambda: AbstractValue.Make(object()),
+            AbstractValue.Make(NO_FLOW).Clone,
             self._calc_expected_flow,
             prerequisites_of_calc={self.all_input_ports_ticket()},
         )
@@ -32,4 +33,7 @@ class ExpectedFlow(LeafSystem):
     @timed
     def _calc_expected_flow(self, context: Context, output: AbstractValue) -> None:
         pair: FramePair = self._pair.Eval(context)
+        if pair is NO_PAIR:
+            output.set_value(NO_FLOW)
+            return
         output.set_value(expected_flow(pair.reference.depth, pair.X_C1C0, pair.current.intrinsics))

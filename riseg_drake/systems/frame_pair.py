@@ -1,13 +1,13 @@
 """The one memory of frames: (I_t-1, I_t, theta_t-1, theta_t) and what stands on the table in both."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
 
-from riseg_drake.geometry.rgbd import FramePair, Immutable
-from riseg_drake.segmentation.above_table import AboveTable
+from riseg_drake.geometry.rgbd import NO_FRAME, NO_PAIR, Frame, FramePair, Immutable
+from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE, AboveTable
 from riseg_drake.segmentation.camera_motion import CameraMotionParameters, PoseError, renewed_pose_error
 from riseg_drake.segmentation.exposure import with_equal_exposure
 from riseg_drake.segmentation.frame_pairs import FramePairParameters, next_pair
@@ -17,10 +17,10 @@ from riseg_drake.segmentation.frame_pairs import FramePairParameters, next_pair
 class RememberedPair(Immutable):
     """The pair, and objMask of its two frames."""
 
-    pair: FramePair
-    above_0: AboveTable
-    above_1: AboveTable
-    pose_error: PoseError
+    pair: FramePair = NO_PAIR
+    above_0: AboveTable = NOTHING_ABOVE_TABLE
+    above_1: AboveTable = NOTHING_ABOVE_TABLE
+    pose_error: PoseError = field(default_factory=PoseError)
     """Of the camera's motion, as the table shows it."""
 
 
@@ -29,10 +29,10 @@ class FramePairMemory(LeafSystem):
 
     All stages read the same pair in the same tick: pairing happens here and nowhere else.
 
-    All outputs are of the pair in memory, and None before the first frame.
+    All outputs are of the pair in memory; before the first frame that is NO_PAIR, with nothing above the table.
 
     Inputs:
-        frame: Frame, or None.
+        frame: Frame.
         above_table: AboveTable of that frame.
         flow_span: effective flow found in the pair that is in memory [1], pixels.
 
@@ -56,10 +56,10 @@ class FramePairMemory(LeafSystem):
         self.set_name("FramePair")
         self._parameters = parameters or FramePairParameters()
         self._camera_motion = camera_motion or CameraMotionParameters()
-        self._frame = self.DeclareAbstractInputPort("frame", AbstractValue.Make(object()))
-        self._above = self.DeclareAbstractInputPort("above_table", AbstractValue.Make(object()))
+        self._frame = self.DeclareAbstractInputPort("frame", AbstractValue.Make(NO_FRAME))
+        self._above = self.DeclareAbstractInputPort("above_table", AbstractValue.Make(NOTHING_ABOVE_TABLE))
         self._flow_span = self.DeclareVectorInputPort("flow_span", 1)
-        self._memory = self.DeclareAbstractState(AbstractValue.Make(None))
+        self._memory = self.DeclareAbstractState(AbstractValue.Make(RememberedPair()))
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, offset, self._take_frame)
         for name, read in (
             ("pair", lambda memory: memory.pair),
@@ -73,14 +73,14 @@ class FramePairMemory(LeafSystem):
         )
 
     def _take_frame(self, context: Context, state: State) -> None:
-        frame = self._frame.Eval(context)
-        memory: RememberedPair | None = context.get_abstract_state(self._memory).get_value()
-        if frame is None or (memory is not None and frame.time <= memory.pair.current.time):
+        frame: Frame = self._frame.Eval(context)
+        memory = self._recall(context)
+        if frame.time <= memory.pair.current.time:  # as that of NO_FRAME always is
             return
         above = self._above.Eval(context)
-        if memory is None:
-            pair = next_pair(None, frame, 0.0, self._parameters)
-            above_0, error = above, PoseError()
+        if memory.pair is NO_PAIR:
+            pair = next_pair(NO_PAIR, frame, 0.0, self._parameters)
+            above_0, error = above, memory.pose_error
         else:
             flow_span = float(self._flow_span.Eval(context)[0])
             frame = replace(frame, sequence=memory.pair.current.sequence + 1)
@@ -92,18 +92,19 @@ class FramePairMemory(LeafSystem):
             )
         state.get_mutable_abstract_state(self._memory).set_value(RememberedPair(pair, above_0, above, error))
 
+    def _recall(self, context: Context) -> RememberedPair:
+        return context.get_abstract_state(int(self._memory)).get_value()
+
     def _declare_output(self, name: str, read: Callable[[RememberedPair], object]) -> None:
         def calc(context: Context, output: AbstractValue) -> None:
-            memory = context.get_abstract_state(self._memory).get_value()
-            output.set_value(None if memory is None else read(memory))
+            output.set_value(read(self._recall(context)))
 
         self.DeclareAbstractOutputPort(
             name,
-            lambda: AbstractValue.Make(object()),
+            AbstractValue.Make(read(RememberedPair())).Clone,
             calc,
             prerequisites_of_calc={self.all_state_ticket()},
         )
 
     def _calc_pair_time(self, context: Context, output: BasicVector) -> None:
-        memory = context.get_abstract_state(self._memory).get_value()
-        output[0] = 0.0 if memory is None else memory.pair.current.time
+        output[0] = max(0.0, self._recall(context).pair.current.time)

@@ -10,7 +10,7 @@ from pydrake.systems.framework import Context, LeafSystem
 from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
 
 from riseg_drake.geometry.camera import Intrinsics
-from riseg_drake.geometry.rgbd import Frame, sanitize_depth
+from riseg_drake.geometry.rgbd import NO_FRAME, Frame, sanitize_depth
 from riseg_drake.systems.stage_clock import timed
 
 
@@ -30,7 +30,7 @@ class FrameView(LeafSystem):
         robot_pixels: [H, W] bool; there where `robot_mask` is None.
 
     Outputs:
-        frame: Frame with `sequence` 0 (who stores frames counts them), None while there is no image.
+        frame: Frame with `sequence` 0 (who stores frames counts them), NO_FRAME while there is no image.
     """
 
     def __init__(
@@ -53,12 +53,12 @@ class FrameView(LeafSystem):
         if X_WC is not None or robot_mask is not None:
             self._position = self.DeclareVectorInputPort("position", num_positions)
         if X_WC is None:
-            self.DeclareAbstractInputPort("camera_pose", AbstractValue.Make(object()))
+            self.DeclareAbstractInputPort("camera_pose", AbstractValue.Make(np.eye(4)))
         if robot_mask is None:
-            self.DeclareAbstractInputPort("robot_pixels", AbstractValue.Make(object()))
+            self.DeclareAbstractInputPort("robot_pixels", AbstractValue.Make(NO_FRAME.robot))
         self.DeclareAbstractOutputPort(
             "frame",
-            lambda: AbstractValue.Make(object()),
+            AbstractValue.Make(NO_FRAME).Clone,
             self._calc_frame,
             prerequisites_of_calc={self.all_input_ports_ticket()},
         )
@@ -75,7 +75,7 @@ class FrameView(LeafSystem):
     def _calc_frame(self, context: Context, output: AbstractValue) -> None:
         color, depth = self._color.Eval(context), self._depth.Eval(context)
         if color.width() == 0 or depth.width() == 0:  # no message has come yet
-            output.set_value(None)
+            output.set_value(NO_FRAME)
             return
         if {(image.height(), image.width()) for image in (color, depth)} != {self._intrinsics.shape}:
             raise ValueError(

@@ -4,8 +4,10 @@ from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, LeafSystem, State
 
 from riseg_drake.geometry.camera import Intrinsics
-from riseg_drake.geometry.rgbd import FramePair
-from riseg_drake.segmentation.bfif import BFIFParameters
+from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR, FramePair
+from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
+from riseg_drake.segmentation.bfif import BFIFParameters, no_groups
+from riseg_drake.segmentation.optical_flow import NO_FLOW
 from riseg_drake.segmentation.segment import Segmentation, SegmentParameters, nothing_segmented, segment
 from riseg_drake.systems.stage_clock import timed
 
@@ -16,7 +18,7 @@ class MaskPropagator(LeafSystem):
     Outputs are as of the last update.
 
     Inputs:
-        pair: FramePair, or None.
+        pair: FramePair.
         expected_flow: E_t [H, W, 2], pixels.
         optical_flow: O_t [H, W, 2], pixels.
         groups: BFIFGroups.
@@ -45,33 +47,34 @@ class MaskPropagator(LeafSystem):
         self.set_name("MaskPropagator")
         self._parameters, self._bfif = parameters or SegmentParameters(), bfif or BFIFParameters()
         self._pair, *self._stages = (
-            self.DeclareAbstractInputPort(name, AbstractValue.Make(object()))
-            for name in (
-                "pair",
-                "expected_flow",
-                "optical_flow",
-                "groups",
-                "above_table_reference",
-                "above_table",
+            self.DeclareAbstractInputPort(name, AbstractValue.Make(model))
+            for name, model in (
+                ("pair", NO_PAIR),
+                ("expected_flow", NO_FLOW),
+                ("optical_flow", NO_FLOW),
+                ("groups", no_groups()),
+                ("above_table_reference", NOTHING_ABOVE_TABLE),
+                ("above_table", NOTHING_ABOVE_TABLE),
             )
         )
-        self._state = self.DeclareAbstractState(AbstractValue.Make(nothing_segmented(intrinsics.shape)))
+        nothing = AbstractValue.Make(nothing_segmented(intrinsics.shape))
+        self._state = self.DeclareAbstractState(nothing)
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, offset, self._update)
         self.DeclareAbstractOutputPort(
             "mask",
-            lambda: AbstractValue.Make(object()),
+            AbstractValue.Make(NO_MASK).Clone,
             lambda context, output: output.set_value(self._segmentation(context).mask),
             prerequisites_of_calc={self.all_state_ticket()},
         )
         self.DeclareAbstractOutputPort(
             "settled_mask",
-            lambda: AbstractValue.Make(object()),
+            AbstractValue.Make(NO_MASK).Clone,
             lambda context, output: output.set_value(self._segmentation(context).settled_mask),
             prerequisites_of_calc={self.all_state_ticket()},
         )
         self.DeclareAbstractOutputPort(
             "segmentation",
-            lambda: AbstractValue.Make(object()),
+            nothing.Clone,
             lambda context, output: output.set_value(self._segmentation(context)),
             prerequisites_of_calc={self.all_state_ticket()},
         )
@@ -80,8 +83,8 @@ class MaskPropagator(LeafSystem):
         return context.get_abstract_state(self._state).get_value()
 
     def _update(self, context: Context, state: State) -> None:
-        pair: FramePair | None = self._pair.Eval(context)
-        if pair is None or pair.current.sequence == self._segmentation(context).sequence:
+        pair: FramePair = self._pair.Eval(context)
+        if pair is NO_PAIR or pair.current.sequence == self._segmentation(context).sequence:
             return
         self._segment(context, state, pair)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
-from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
+from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR, Frame, FramePair, Immutable
 from riseg_drake.pushing.push import ArmPhase
 from riseg_drake.systems.memory import replace_memory
 
@@ -36,11 +36,15 @@ class RefinedMask(Immutable):
     """[H, W], ids as in L_t."""
 
 
+NO_REFINED_MASK = RefinedMask(-np.inf, NO_MASK)
+"""What there is before the first."""
+
+
 @dataclass(frozen=True)
 class _Memory(Immutable):
     """All that MaskRefiner remembers. Never changed, only replaced."""
 
-    refined: RefinedMask | None = None
+    refined: RefinedMask = NO_REFINED_MASK
     under_way: tuple[Future, ...] = ()
     """Oldest first."""
     at_rest: tuple[Frame, NDArray[np.uint16]] | None = None
@@ -57,13 +61,13 @@ class MaskRefiner(LeafSystem):
     ever waits for the worker.
 
     Inputs:
-        pair: FramePair, or None.
+        pair: FramePair.
         mask: L_t of its current frame [H, W].
         phase: ArmPhase.
-        demand: any value, may be left unconnected; when it changes, the present mask is refined as well.
+        demand: any object, may be left unconnected; when it changes, the present mask is refined as well.
 
     Outputs:
-        refined: RefinedMask, the newest; None before the first.
+        refined: RefinedMask, the newest; NO_REFINED_MASK before the first.
     """
 
     def __init__(self, refine: Refinement, period: float, offset: float) -> None:
@@ -73,14 +77,19 @@ class MaskRefiner(LeafSystem):
         self._refine = refine
         self._worker = ThreadPoolExecutor(1, "MaskRefiner", initializer=_stand_back)
         self._pair, self._mask, self._phase, self._demand = (
-            self.DeclareAbstractInputPort(name, AbstractValue.Make(object()))
-            for name in ("pair", "mask", "phase", "demand")
+            self.DeclareAbstractInputPort(name, AbstractValue.Make(model))
+            for name, model in (
+                ("pair", NO_PAIR),
+                ("mask", NO_MASK),
+                ("phase", ArmPhase.OBSERVE),
+                ("demand", _NO_DEMAND),
+            )
         )
         self._memory = self.DeclareAbstractState(AbstractValue.Make(_Memory()))
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, offset, self._update)
         self.DeclareAbstractOutputPort(
             "refined",
-            lambda: AbstractValue.Make(object()),
+            AbstractValue.Make(NO_REFINED_MASK).Clone,
             lambda context, output: output.set_value(self._recall(context).refined),
             prerequisites_of_calc={self.all_state_ticket()},
         )
@@ -107,8 +116,8 @@ class MaskRefiner(LeafSystem):
         if memory.under_way and memory.under_way[0].done():
             # One an update, so that whoever watches the output misses none.
             memory = replace(memory, refined=memory.under_way[0].result(), under_way=memory.under_way[1:])
-        pair: FramePair | None = self._pair.Eval(context)
-        if pair is None:
+        pair: FramePair = self._pair.Eval(context)
+        if pair is NO_PAIR:
             return memory
         seen = memory.at_rest
         if self._phase.Eval(context) is ArmPhase.OBSERVE:

@@ -3,8 +3,9 @@
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, LeafSystem
 
-from riseg_drake.geometry.rgbd import FramePair
-from riseg_drake.segmentation.optical_flow import DisFlow, FlowMethod, flow_around
+from riseg_drake.geometry.rgbd import NO_PAIR, FramePair
+from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
+from riseg_drake.segmentation.optical_flow import NO_FLOW, DisFlow, FlowMethod, flow_around
 from riseg_drake.systems.stage_clock import timed
 
 
@@ -25,12 +26,12 @@ class OpticalFlow(LeafSystem):
         self.set_name("OpticalFlow")
         self._method = method or DisFlow()
         self._pair, self._above = (
-            self.DeclareAbstractInputPort(name, AbstractValue.Make(object()))
-            for name in ("pair", "above_table")
+            self.DeclareAbstractInputPort(name, AbstractValue.Make(model))
+            for name, model in (("pair", NO_PAIR), ("above_table", NOTHING_ABOVE_TABLE))
         )
         self.DeclareAbstractOutputPort(
             "optical_flow",
-            lambda: AbstractValue.Make(object()),
+            AbstractValue.Make(NO_FLOW).Clone,
             self._calc_optical_flow,
             prerequisites_of_calc={self.all_input_ports_ticket()},
         )
@@ -38,7 +39,9 @@ class OpticalFlow(LeafSystem):
     @timed
     def _calc_optical_flow(self, context: Context, output: AbstractValue) -> None:
         pair: FramePair = self._pair.Eval(context)
-        if self._above.HasValue(context):
+        if pair is NO_PAIR:
+            output.set_value(NO_FLOW)
+        elif self._above.HasValue(context):
             output.set_value(flow_around(self._above.Eval(context), pair, self._method))
         else:
             output.set_value(self._method(pair.reference.color, pair.current.color))

@@ -1,12 +1,14 @@
 """PushPlanner: Alg. 3, FindAction, behind ports."""
 
 import numpy as np
-from pydrake.common.value import AbstractValue, Value
+from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, LeafSystem
 
-from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR, FramePair
+from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.pushing.push_planning import PushPlanningParameters, plan_push
 from riseg_drake.robot.kinematics import PandaKinematics
+from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
 from riseg_drake.systems.stage_clock import timed
 
 
@@ -19,10 +21,10 @@ class PushPlanner(LeafSystem):
             of the current frame (GetObjsAboveTable).
         mask: L_t of the current frame, [H, W].
         position: the arm's commanded joint angles [7], rad; where the path begins and ends.
-        tried_pushes: sequence of TriedPush; may be left unconnected.
+        tried_pushes: tuple of TriedPush; may be left unconnected.
 
     Outputs:
-        push: Push with its path, or None when everything is segmented, no valid push exists, or no
+        push: Push with its path; NO_PUSH when everything is segmented, no valid push exists, or no
             frame has come yet.
 
     The same inputs give the same push: the clustering's random numbers come from the seed and the
@@ -40,24 +42,25 @@ class PushPlanner(LeafSystem):
         self._kinematics = kinematics
         self._parameters = parameters or PushPlanningParameters()
         self._seed = seed
-        anything = Value[object](None)
-        self._pair = self.DeclareAbstractInputPort("pair", anything)
-        self._above_table = self.DeclareAbstractInputPort("above_table", anything)
-        self._mask = self.DeclareAbstractInputPort("mask", anything)
+        self._pair = self.DeclareAbstractInputPort("pair", AbstractValue.Make(NO_PAIR))
+        self._above_table = self.DeclareAbstractInputPort(
+            "above_table", AbstractValue.Make(NOTHING_ABOVE_TABLE)
+        )
+        self._mask = self.DeclareAbstractInputPort("mask", AbstractValue.Make(NO_MASK))
         self._position = self.DeclareVectorInputPort("position", 7)
-        self._tried = self.DeclareAbstractInputPort("tried_pushes", anything)
+        self._tried = self.DeclareAbstractInputPort("tried_pushes", AbstractValue.Make(()))
         self.DeclareAbstractOutputPort(
             "push",
-            alloc=lambda: Value[object](None),
+            alloc=AbstractValue.Make(NO_PUSH).Clone,
             calc=self._calc_push,
             prerequisites_of_calc={self.all_input_ports_ticket()},
         )
 
     @timed
     def _calc_push(self, context: Context, output: AbstractValue) -> None:
-        pair: FramePair | None = self._pair.Eval(context)
-        if pair is None:
-            output.set_value(None)
+        pair: FramePair = self._pair.Eval(context)
+        if pair is NO_PAIR:
+            output.set_value(NO_PUSH)
             return
         above_table = self._above_table.Eval(context)
         frame = pair.current
@@ -73,4 +76,4 @@ class PushPlanner(LeafSystem):
             self._tried.Eval(context) if self._tried.HasValue(context) else (),
             self._parameters,
         )
-        output.set_value(push)
+        output.set_value(push or NO_PUSH)

@@ -6,7 +6,7 @@ from riseg_drake.app import arm_watch
 from riseg_drake.app.arm_travel import TravelError
 from riseg_drake.app.arm_watch import CONTACT_MARGIN, ArmWatch
 from riseg_drake.app.interactions import Progress
-from riseg_drake.pushing.push import ArmPhase
+from riseg_drake.pushing.push import NO_PUSH, ArmPhase
 from riseg_drake.robot.supervisor import Cause, Mode, SafetyState
 
 HERE = object()
@@ -17,7 +17,7 @@ class Desk:
     """A watch with an arm, an operator and a diagram that say what the test wants."""
 
     def __init__(self, monkeypatch, answer=None):
-        self.now, self.answer, self.push, self.doing = 50.0, answer, None, ArmPhase.OBSERVE
+        self.now, self.answer, self.push, self.doing = 50.0, answer, NO_PUSH, ArmPhase.OBSERVE
         self.told, self.contacts, self.releases, self.words = [], [], [], 0
         self.off_path, self.way, self.planned_from = 0.0, 3.0, None
         self.progress = Progress()

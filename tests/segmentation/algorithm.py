@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.rgbd import Frame, FramePair
+from riseg_drake.geometry.rgbd import NO_PAIR, Frame, FramePair
 from riseg_drake.segmentation.above_table import AboveTable, AboveTableParameters, objects_above_table
 from riseg_drake.segmentation.bfif import BFIFParameters, group_body_frames, no_groups
 from riseg_drake.segmentation.expected_flow import expected_flow
@@ -24,7 +24,7 @@ class Algorithm:
     pairs: FramePairParameters = field(default_factory=FramePairParameters)
     flow: FlowMethod = field(default_factory=DisFlow)
 
-    pair: FramePair | None = None
+    pair: FramePair = NO_PAIR
     groups: BFIFGroups = field(default_factory=no_groups)
     above: dict[int, AboveTable] = field(default_factory=dict)
     answer: Segmentation | None = None

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from riseg_drake.geometry.camera import Intrinsics
-from riseg_drake.geometry.rgbd import Frame, FramePair
+from riseg_drake.geometry.rgbd import NO_PAIR, Frame, FramePair
 from riseg_drake.segmentation.frame_pairs import FramePairParameters, camera_span, next_pair
 from tests.segmentation.drawn_scene import looking_down
 
@@ -27,7 +27,7 @@ def frame(sequence: int, X_WC: np.ndarray | None = None, rate: float = 15.0) -> 
 
 def references(frames: list[Frame], spans: list[float], **parameters) -> list[int]:
     """The reference of each pair, where `spans` is what each frame's pair turned out to span."""
-    pair, out, span = None, [], 0.0
+    pair, out, span = NO_PAIR, [], 0.0
     for newest, following in zip(frames, spans, strict=True):
         pair = next_pair(pair, newest, span, FramePairParameters(**parameters))
         assert pair.current is newest
@@ -38,7 +38,7 @@ def references(frames: list[Frame], spans: list[float], **parameters) -> list[in
 
 def test_the_first_frame_is_paired_with_itself() -> None:
     first = frame(0)
-    pair = next_pair(None, first, 0.0, FramePairParameters())
+    pair = next_pair(NO_PAIR, first, 0.0, FramePairParameters())
     assert pair.reference is pair.current is first
 
 
@@ -85,4 +85,4 @@ def test_the_cameras_span_is_that_of_its_shift_or_of_its_turn(shift: float) -> N
 
 def test_another_kind_of_pair_is_refused_with_the_choices() -> None:
     with pytest.raises(ValueError, match=r"'keyframe'.*motion or consecutive"):
-        next_pair(None, frame(0), 0.0, FramePairParameters(kind="keyframe"))
+        next_pair(NO_PAIR, frame(0), 0.0, FramePairParameters(kind="keyframe"))

@@ -4,14 +4,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
-from pydrake.common.value import Value
+from pydrake.common.value import AbstractValue
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import VectorLogSink
 
 from riseg_drake.geometry.camera import Intrinsics
-from riseg_drake.geometry.rgbd import Frame, FramePair
-from riseg_drake.pushing.push import ArmPhase, Push
+from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR, Frame, FramePair
+from riseg_drake.pushing.push import NO_PUSH, ArmPhase, Push
 from riseg_drake.pushing.push_path import PushPath
 from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest
 from riseg_drake.robot.limits import PANDA_LIMITS
@@ -47,7 +47,7 @@ def push_to(q_there, start_offset=0.0, at=0.0, limits=None):
 
 @dataclass
 class Script:
-    """What the stand-in answers: a push for each interaction, then None; and what the mask shows."""
+    """What the stand-in answers: a push for each interaction, then NO_PUSH; and what the mask shows."""
 
     pushes: list
     ids_after: list = field(default_factory=lambda: [0] * 9)
@@ -60,8 +60,7 @@ class Eyes(LeafSystem):
     def __init__(self, script):
         super().__init__()
         self.script = script
-        anything = Value[object](None)
-        step = self.DeclareAbstractInputPort("interaction_step", anything)
+        step = self.DeclareAbstractInputPort("interaction_step", AbstractValue.Make(0))
         time = {self.time_ticket()}
 
         def frame(context):
@@ -80,11 +79,11 @@ class Eyes(LeafSystem):
         def push(context, output):
             script.asked.append((context.get_time(), frame(context).time))
             done = step.Eval(context)
-            output.set_value(script.pushes[done] if done < len(script.pushes) else None)
+            output.set_value(script.pushes[done] if done < len(script.pushes) else NO_PUSH)
 
-        for name, calc in (("pair", pair), ("mask", mask), ("push", push)):
+        for name, model, calc in (("pair", NO_PAIR, pair), ("mask", NO_MASK, mask), ("push", NO_PUSH, push)):
             self.DeclareAbstractOutputPort(
-                name, lambda: Value[object](None), calc, time | {self.all_input_ports_ticket()}
+                name, AbstractValue.Make(model).Clone, calc, time | {self.all_input_ports_ticket()}
             )
 
 
@@ -127,7 +126,7 @@ def test_phases_come_in_their_order_and_null_ends_them():
     once = [ArmPhase.APPROACH, ArmPhase.PUSH, ArmPhase.RETREAT, ArmPhase.OBSERVE]
     assert phases == [ArmPhase.OBSERVE, *once, *once, ArmPhase.DONE]
     assert motion.GetOutputPort("interaction_step").Eval(context) == 2
-    assert motion.GetOutputPort("active_push").Eval(context) is None
+    assert motion.GetOutputPort("active_push").Eval(context) is NO_PUSH
 
 
 def test_nothing_to_push_is_done_after_looking_twice():
@@ -312,4 +311,4 @@ def test_a_proposal_is_withdrawn_when_the_arm_is_led_away():
     simulator.AdvanceTo(1.9)
     assert motion.GetOutputPort("active_push").Eval(context) is push
     simulator.AdvanceTo(2.1)
-    assert motion.GetOutputPort("active_push").Eval(context) is None
+    assert motion.GetOutputPort("active_push").Eval(context) is NO_PUSH

@@ -9,7 +9,8 @@ from pydrake.systems.primitives import ConstantVectorSource
 from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
 
 from riseg_drake.geometry.camera import Intrinsics
-from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.geometry.rgbd import NO_FRAME, NO_PAIR, FramePair
+from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
 from riseg_drake.segmentation.frame_pairs import FramePairParameters
 from riseg_drake.systems.frame_pair import FramePairMemory
 from riseg_drake.systems.frame_view import FrameView
@@ -69,10 +70,10 @@ class AboveOfFrame(LeafSystem):
 
     def __init__(self) -> None:
         super().__init__()
-        frame = self.DeclareAbstractInputPort("frame", AbstractValue.Make(object()))
+        frame = self.DeclareAbstractInputPort("frame", AbstractValue.Make(NO_FRAME))
         self.DeclareAbstractOutputPort(
             "above_table",
-            lambda: AbstractValue.Make(object()),
+            AbstractValue.Make(Above()).Clone,
             lambda context, output: output.set_value(Above(("above", number_in(frame.Eval(context))))),
             {self.all_input_ports_ticket()},
         )
@@ -92,7 +93,7 @@ def silhouette(q: np.ndarray) -> np.ndarray:
 
 def number_in(frame) -> int | None:
     """The number written into the image."""
-    return None if frame is None else int(frame.color[0, 0, 0])
+    return None if frame is NO_FRAME else int(frame.color[0, 0, 0])
 
 
 class Above(tuple):
@@ -120,7 +121,7 @@ class Loop:
         self.simulator = Simulator(builder.Build())
         self.context = self.memory.GetMyContextFromRoot(self.simulator.get_context())
 
-    def at(self, time: float) -> FramePair | None:
+    def at(self, time: float) -> FramePair:
         self.simulator.AdvanceTo(time)
         return self.read("pair")
 
@@ -140,9 +141,9 @@ def test_ports_have_the_names_of_the_contract() -> None:
 
 def test_before_the_first_frame_there_is_nothing() -> None:
     loop = Loop()
-    assert loop.at(OFFSET / 2) is None
-    assert loop.read("above_table") is None
-    assert loop.read("above_table_reference") is None
+    assert loop.at(OFFSET / 2) is NO_PAIR
+    assert loop.read("above_table") is NOTHING_ABOVE_TABLE
+    assert loop.read("above_table_reference") is NOTHING_ABOVE_TABLE
     assert loop.read("pair_time") == pytest.approx([0.0])
 
 

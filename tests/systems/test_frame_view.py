@@ -6,7 +6,7 @@ from pydrake.common.value import Value
 from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
 
 from riseg_drake.geometry.camera import Intrinsics
-from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.geometry.rgbd import NO_FRAME, Frame
 from riseg_drake.systems.frame_view import FrameView
 from tests.systems.ports import port_names
 
@@ -34,7 +34,7 @@ def images(width: int = 6, height: int = 4, depth_size: tuple[int, int] | None =
     return color, depth
 
 
-def seen(color: ImageRgba8U, depth: ImageDepth32F, q: np.ndarray = Q) -> Frame | None:
+def seen(color: ImageRgba8U, depth: ImageDepth32F, q: np.ndarray = Q) -> Frame:
     view = FrameView(CAMERA, forward, silhouette)
     context = view.CreateDefaultContext()
     for name, value in (
@@ -84,7 +84,7 @@ def test_a_frame_keeps_its_pixels_when_the_next_image_comes() -> None:
 
 @pytest.mark.parametrize("sizes", [(0, 0), (6, 4)], ids=["no image", "no depth image"])
 def test_before_the_first_image_there_is_no_frame(sizes: tuple[int, int]) -> None:
-    assert seen(*images(*sizes, depth_size=(0, 0))) is None
+    assert seen(*images(*sizes, depth_size=(0, 0))) is NO_FRAME
 
 
 @pytest.mark.parametrize(("color_size", "depth_size"), [((8, 6), (8, 6)), ((6, 4), (12, 8)), ((6, 4), (4, 6))])

@@ -5,7 +5,7 @@ import pytest
 from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
 
-from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.geometry.rgbd import NO_PAIR, FramePair
 from riseg_drake.segmentation.bfif import BFIFParameters
 from riseg_drake.segmentation.segment import Segmentation, SegmentParameters, nothing_segmented, segment
 from riseg_drake.systems import mask_propagator
@@ -120,7 +120,7 @@ def test_each_new_pair_is_taken_in_at_the_next_tick(payloads, drawn_frames, call
 
 def test_before_the_first_pair_nothing_happens(payloads, calls) -> None:
     alone = Alone(payloads)
-    alone.show(pair=None)
+    alone.show(pair=NO_PAIR)
     assert not alone.at(3.5 * PERIOD).any()
     assert calls == []
     alone.show(pair=payloads.pair)

@@ -9,9 +9,9 @@ import pytest
 from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
 
-from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR, FramePair
 from riseg_drake.pushing.push import ArmPhase
-from riseg_drake.systems.mask_refiner import MaskRefiner
+from riseg_drake.systems.mask_refiner import NO_REFINED_MASK, MaskRefiner
 from tests.systems.ports import port_names
 
 PERIOD, OFFSET = 0.1, 0.002
@@ -43,7 +43,7 @@ class Alone:
         self.simulator = Simulator(self.system)
         self.context = self.simulator.get_mutable_context()
         self.ticks = 0
-        self.show(pair=None, mask=np.zeros((2, 2), np.uint16), phase=ArmPhase.OBSERVE)
+        self.show(pair=NO_PAIR, mask=NO_MASK, phase=ArmPhase.OBSERVE)
 
     def show(self, **inputs) -> None:
         for name, value in inputs.items():
@@ -87,7 +87,7 @@ def test_frames_go_on_while_the_model_works_and_its_answer_comes_later(drawn_fra
     assert model.has_begun.wait(LONG)
     # The model does not end before we say so: an update that waited for it would never return.
     for number in (3, 4, 5, 6, 7):
-        assert alone.tick(number, ArmPhase.PUSH) is None
+        assert alone.tick(number, ArmPhase.PUSH) is NO_REFINED_MASK
     assert alone.ticks == 8
     model.may_end.set()
     (coming,) = alone.finish()
@@ -167,7 +167,7 @@ def test_the_worker_stands_back_and_the_frames_do_not(drawn_frames):
 def test_without_a_frame_nothing_happens(model):
     alone = Alone(model, [])
     alone.simulator.AdvanceTo(3 * PERIOD)
-    assert alone.refined() is None
+    assert alone.refined() is NO_REFINED_MASK
     assert alone.finish() == []
 
 

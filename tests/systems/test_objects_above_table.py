@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from riseg_drake.segmentation.above_table import AboveTable, AboveTableParameters
+from riseg_drake.geometry.rgbd import NO_FRAME
+from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE, AboveTable, AboveTableParameters
 from riseg_drake.systems.objects_above_table import ObjectsAboveTable
 from tests.systems.ports import evaluate, port_names
 
@@ -25,4 +26,4 @@ def test_its_parameters_are_those_given(payloads) -> None:
 
 
 def test_without_a_frame_there_is_nothing_to_say() -> None:
-    assert evaluate(ObjectsAboveTable(), "above_table", frame=None) is None
+    assert evaluate(ObjectsAboveTable(), "above_table", frame=NO_FRAME) is NOTHING_ABOVE_TABLE

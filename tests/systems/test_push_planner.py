@@ -7,7 +7,8 @@ import pytest
 from pydrake.common.value import Value
 
 from riseg_drake.geometry.camera import Intrinsics, rays
-from riseg_drake.geometry.rgbd import Frame, FramePair
+from riseg_drake.geometry.rgbd import NO_PAIR, Frame, FramePair
+from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.pushing.tried_pushes import TriedPush
 from riseg_drake.robot.kinematics import PandaKinematics, observe_pose
 from riseg_drake.systems.push_planner import PushPlanner
@@ -73,11 +74,11 @@ def test_push_goes_through_the_object_and_has_a_path_from_here_to_here(panda, q_
 
 
 def test_segmented_scene_gives_null(panda, q_observe, scene):
-    assert evaluate(panda, q_observe, *scene, scene[1].mask.astype(np.uint16)) is None
+    assert evaluate(panda, q_observe, *scene, scene[1].mask.astype(np.uint16)) is NO_PUSH
 
 
 def test_before_the_first_frame_there_is_no_push(panda, q_observe, scene):
-    assert evaluate(panda, q_observe, None, scene[1], NOTHING) is None
+    assert evaluate(panda, q_observe, NO_PAIR, scene[1], NOTHING) is NO_PUSH
 
 
 def test_same_seed_and_frame_give_the_same_push(panda, q_observe, scene):

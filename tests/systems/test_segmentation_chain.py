@@ -86,11 +86,9 @@ class Reader(LeafSystem):
         return self.DeclareAbstractInputPort(name, port.Allocate())
 
     def _read(self, context) -> EventStatus:
-        pair = self._inputs[0].Eval(context)
-        if pair is not None:
-            self.reads += 1
-            for read in self._inputs:
-                read.Eval(context)
+        self.reads += 1
+        for read in self._inputs:
+            read.Eval(context)
         return EventStatus.Succeeded()
 
 
