@@ -135,7 +135,7 @@ def command_line() -> argparse.ArgumentParser:
     emulate.add_argument(
         "--control-mode",
         choices=("status_only", "velocity", "position"),
-        help="the arm driver's flag (as the scenario says: position)",
+        help="the arm driver's flag (as the scenario says: velocity)",
     )
     emulate.add_argument(
         "--fault",
@@ -145,7 +145,15 @@ def command_line() -> argparse.ArgumentParser:
         help="misbehave from the start, such as 'images drop 0.1' or 'status delay 0.03'; may be repeated",
     )
     emulate.add_argument(
-        "--say", metavar="WORD", help="tell a running emulator: reflex, stop, recover, 'die 2', or a fault"
+        "--say",
+        metavar="WORD",
+        help="tell a running emulator: reflex, stop, recover, start, die, 'guide 1 0.3', or a fault",
+    )
+    emulate.add_argument(
+        "--judge",
+        type=Path,
+        metavar="FILE",
+        help="write at the end how calm the arm's own motion was, as shares of its limits (JSON)",
     )
 
     segment = _add(

@@ -67,7 +67,9 @@ def emulate(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg emulate`."""
     from riseg_drake.app.emulate import emulate_command
 
-    emulate_command(chosen.scenario, chosen.seed, chosen.control_mode, chosen.fault, chosen.say, console)
+    emulate_command(
+        chosen.scenario, chosen.seed, chosen.control_mode, chosen.fault, chosen.say, chosen.judge, console
+    )
 
 
 def segment(chosen: argparse.Namespace, console: Console) -> None:

@@ -11,6 +11,7 @@ import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import asdict
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -19,13 +20,16 @@ from time import sleep, time
 from rich.console import Console
 
 from riseg_drake.app.graphics import require_graphics
+from riseg_drake.app.output import OutputError, to_json
 from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
 from riseg_drake.app.scenario_file import ScenarioError
+from riseg_drake.recording.whole_file import write_text
 from riseg_drake.stations.emulated_arm import TICK_US, EmulatedArm
 from riseg_drake.stations.emulated_camera import EmulatedCamera
 from riseg_drake.stations.emulated_drivers import CameraSide, EmulatorConfig, Moment, PandaSide
 from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm, receive_buffer_warning
 from riseg_drake.stations.misbehaviour import CONTROL_CHANNEL, WORDS, WordError, parse_word
+from riseg_drake.stations.motion_judge import MotionVerdict
 from riseg_drake.stations.promptness import be_prompt
 
 _GIVE_WAY = 2  # niceness of the camera's process: the status comes first, but pictures must not starve
@@ -39,11 +43,13 @@ def emulate_command(
     control_mode: str | None,
     faults: Sequence[str],
     say: str | None,
+    judge: Path | None,
     console: Console,
 ) -> None:
     """Behave as the drivers do until Ctrl-C; or, with `say`, tell a running emulator a word.
 
-    Raises ScenarioError for a scene or settings that cannot be, WordError for an unknown word.
+    How calm the arm's motion was is said at the end, and written to `judge` as JSON. Raises ScenarioError for a
+    scene or settings that cannot be, WordError for an unknown word, OutputError where nothing can be written.
     """
     scenario = load_scenario(scenario_file)
     config = scenario.emulator
@@ -52,13 +58,15 @@ def emulate_command(
     if say:
         open_lcm(config.lcm).Publish(CONTROL_CHANNEL, say.encode())
         return
+    if judge:
+        write_verdict(judge, MotionVerdict())  # so that a file that cannot be written is noticed now
     require_graphics()
     if control_mode:
         config.driver.control_mode = control_mode
     warning = receive_buffer_warning(config.lcm.url)
     if warning:
         console.print(f"[yellow]{warning}")
-    with _camera_process(scenario_file, seed) as camera:
+    with _camera_process(scenario_file, seed, faults) as camera:
         with console.status("placing the objects"):
             arm = _place(scenario, seed)
             complaint = camera.recv()
@@ -69,7 +77,21 @@ def emulate_command(
             f"{config.lcm.image_channel} on {config.lcm.url}, --control_mode={config.driver.control_mode}; "
             "Ctrl-C ends it"
         )
-        _run(PandaSide(open_lcm(config.lcm), config, arm, seed), config, camera, faults, console)
+        _run(PandaSide(open_lcm(config.lcm), config, arm, seed, faults), config, camera, console)
+        verdict = arm.driver.judge.verdict()
+        if verdict.seconds:
+            console.print(f"the arm {verdict}")
+        if judge:
+            write_verdict(judge, verdict)
+
+
+def write_verdict(file: Path, verdict: MotionVerdict) -> None:
+    """How calm the arm's motion was, as JSON. Raises OutputError."""
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_text(file, to_json(asdict(verdict)))
+    except OSError as error:
+        raise OutputError(f"cannot write {file}: {error.strerror}") from None
 
 
 def _place(scenario: Scenario, seed: int) -> EmulatedArm:
@@ -79,12 +101,8 @@ def _place(scenario: Scenario, seed: int) -> EmulatedArm:
         raise ScenarioError(" ".join(str(error).split())) from error
 
 
-def _run(
-    side: PandaSide, config: EmulatorConfig, camera: Connection, faults: Sequence[str], console: Console
-) -> None:
+def _run(side: PandaSide, config: EmulatorConfig, camera: Connection, console: Console) -> None:
     """Keep time until Ctrl-C, and say then what rates were reached."""
-    for word in faults:
-        open_lcm(config.lcm).Publish(CONTROL_CHANNEL, word.encode())
     if _may_read_terminal():
         if sys.stdin.isatty():
             console.print(f"you may type: {WORDS}")
@@ -117,16 +135,16 @@ def _keep_time(side: PandaSide, camera: Connection, period: float, console: Cons
         if arm.state_us >= next_picture:
             # Late pictures do not bring the next one nearer.
             next_picture = max(next_picture + int(1e6 * period), arm.state_us + int(0.5e6 * period))
-            camera.send(Moment(arm.state_us, arm.positions(), not arm.driver.is_moving))
+            camera.send(Moment(arm.state_us, arm.positions(), not arm.driver.robot.is_moving))
         sleep(max(0.0, 1e-6 * (arm.wall_us + TICK_US - _wall_us())))
 
 
 @contextmanager
-def _camera_process(scenario_file: Path | None, seed: int) -> Iterator[Connection]:
+def _camera_process(scenario_file: Path | None, seed: int, faults: Sequence[str]) -> Iterator[Connection]:
     """The camera's process for the time of a `with`; it first says "", or why it cannot be."""
     spawn = get_context("spawn")
     here, there = spawn.Pipe()
-    process = spawn.Process(target=_draw, args=(there, scenario_file, seed), daemon=True)
+    process = spawn.Process(target=_draw, args=(there, scenario_file, seed, faults), daemon=True)
     process.start()
     there.close()
     try:
@@ -136,7 +154,7 @@ def _camera_process(scenario_file: Path | None, seed: int) -> Iterator[Connectio
         process.join(timeout=5)
 
 
-def _draw(commands: Connection, scenario_file: Path | None, seed: int) -> None:
+def _draw(commands: Connection, scenario_file: Path | None, seed: int, faults: Sequence[str]) -> None:
     """The camera's process: draws where everything was said to be, and falls behind rather than late."""
     for end in (signal.SIGINT, signal.SIGTERM):
         signal.signal(end, signal.SIG_IGN)  # Ctrl-C is the other process's to hear
@@ -148,7 +166,7 @@ def _draw(commands: Connection, scenario_file: Path | None, seed: int) -> None:
         with suppress(BrokenPipeError):
             commands.send(" ".join(str(error).split()))
         return
-    side = CameraSide(open_lcm(scenario.emulator.lcm), scenario.emulator, eye, seed)
+    side = CameraSide(open_lcm(scenario.emulator.lcm), scenario.emulator, eye, seed, faults)
     gc.collect()
     gc.freeze()
     with suppress(EOFError, BrokenPipeError):  # where the other process is gone

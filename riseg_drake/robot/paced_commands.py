@@ -20,6 +20,9 @@ from riseg_drake.robot.command_stream import VELOCITY, ArmStatus, CommandStream
 
 LONGEST_PAUSE = 0.05
 """The longest pause that is made up for, s: half the driver's expiry. An arm at 0.3 rad/s brakes in 40 ms."""
+STILL, STILL_FOR = 0.002, 0.02
+"""An arm that has been left alone has come to rest where no joint turns by more than the one, rad, in the other,
+s: below 0.1 rad/s it stops within a milliradian."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,8 @@ class PacedCommands:
         self._period = stream.period
         self._due = self._followed = steady
         self._last: NDArray[np.float64] | None = None
+        self._is_coasting = False
+        self._seen: ArmStatus | None = None  # while it is coasting
 
     def next(
         self, steady: float, wall: float, status: ArmStatus | None, image_time: float | None
@@ -56,8 +61,10 @@ class PacedCommands:
         Status and pictures tell their time by the steady clock.
         """
         if steady - self._followed > LONGEST_PAUSE:
-            self._begin_at_rest(status)
+            self._is_coasting, self._seen = self._last is not None, None
             self._due = steady
+        if self._is_coasting and status is not None:
+            self._begin_at_rest(status, steady)
         return self._due_now(steady, wall, lambda: self._stream.step(steady, status, image_time))
 
     def brake(self, steady: float, wall: float) -> StampedCommand | None:
@@ -89,8 +96,20 @@ class PacedCommands:
         """How long there is nothing to do, s."""
         return max(self._due - steady, 0.0)
 
-    def _begin_at_rest(self, status: ArmStatus | None) -> None:
-        """At the last command in position mode, and wherever the arm has come to in velocity mode."""
-        if self._last is None or status is None:
+    def _begin_at_rest(self, status: ArmStatus, now: float) -> None:
+        """At the last command in position mode, and wherever the arm comes to in velocity mode.
+
+        There it has gone on with the last velocity until that expired, brakes now that commands are zero, and
+        what it has told meanwhile may be as old as the pause was long.
+        """
+        if self._stream.mode != VELOCITY:
+            assert self._last is not None
+            self._stream.begin_at_rest(self._last)
+            self._is_coasting = False
             return
-        self._stream.begin_at_rest(status.position if self._stream.mode == VELOCITY else self._last)
+        self._stream.begin_at_rest(status.position)
+        if self._seen is None or status.time - self._seen.time >= STILL_FOR:
+            turned = np.inf if self._seen is None else np.abs(status.position - self._seen.position).max()
+            is_recent = now - status.time <= LONGEST_PAUSE
+            self._seen = status
+            self._is_coasting = not (is_recent and turned <= STILL)

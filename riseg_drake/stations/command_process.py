@@ -196,6 +196,8 @@ def stream_commands(
         sys.exit(1)
     be_prompt(PRIORITY)
     connection.send(READY)
+    _listen(network, session)
+    session.set_out(clock())
     sent: deque[float] = deque(maxlen=1_000_000)
     rounds, failures = 0, 0
     while not session.is_over and failures < MOST_FAILURES:

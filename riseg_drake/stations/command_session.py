@@ -86,6 +86,12 @@ class CommandSession:
         """Whether messages of the arm were left out a moment ago."""
         return self._flooded_until > self._now
 
+    def set_out(self, now: float) -> None:
+        """Rounds begin at a time, s: what came while the process got ready is old, what followed it unknown."""
+        self._statuses.clear()
+        self._pictures.clear()
+        self._now, self._paced = now, PacedCommands(self._stream, now)
+
     def hear_status(self, data: bytes) -> None:
         """A message has come from the arm's driver; it is looked at in the next round."""
         self._statuses.append(data)

@@ -1,4 +1,4 @@
-"""The simulated world behind an emulated Panda driver: takes its commands, moves, and tells its status."""
+"""The simulated world behind an emulated Panda driver: moves as its robot does, and measures itself."""
 
 import numpy as np
 from drake import lcmt_panda_status
@@ -7,6 +7,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from riseg_drake.stations.panda_driver import PandaDriver, PandaDriverConfig
+from riseg_drake.stations.panda_robot import MOVE
 from riseg_drake.stations.simulated import SimulatedStationConfig, add_world, start_position
 
 TICK_US = 1000
@@ -27,7 +28,9 @@ class EmulatedArm:
         builder = DiagramBuilder()
         world = add_world(builder, config, seed, 1e-6 * TICK_US * self._ticks_a_step)
         self.plant = world.plant
-        self.driver = PandaDriver(driver, np.array(start_position(config)))
+        self.driver = PandaDriver(driver, np.array(start_position(config)), config.panda.limits)
+        self._noise = np.array([[driver.position_noise], [driver.velocity_noise]])
+        self._rng = np.random.default_rng([seed, 3])
         self._arm = world.panda.arm
         port = self.plant.get_desired_state_input_port(self._arm)
         builder.ExportInput(port, "desired_state")
@@ -55,7 +58,7 @@ class EmulatedArm:
         self.driver.miss()
 
     def tick(self) -> None:
-        """One millisecond. Raises DriverEndedError."""
+        """One millisecond."""
         self._ticks += 1
         self.driver.tick(self.wall_us)
         if self._ticks % self._ticks_a_step:
@@ -70,8 +73,8 @@ class EmulatedArm:
         return np.array(self.plant.GetPositions(self._context))
 
     def status(self) -> lcmt_panda_status:
-        """What the driver publishes at this tick."""
-        driver, plant, context = self.driver, self.plant, self._context
+        """What a driver publishes at this tick."""
+        robot, plant, context = self.driver.robot, self.plant, self._context
         torque = plant.get_net_actuation_output_port(self._arm).Eval(context)
         message = lcmt_panda_status()
         message.utime = self.wall_us
@@ -79,18 +82,19 @@ class EmulatedArm:
         message.num_joints = 7
         velocity = plant.GetVelocities(context, self._arm)
         since = 1e-6 * (self.wall_us - self.state_us)
-        message.joint_position = plant.GetPositions(context, self._arm) + since * velocity
-        message.joint_velocity = velocity
-        message.joint_position_desired = driver.q_d
-        message.joint_velocity_desired = driver.v_d
-        message.joint_acceleration_desired = driver.a_d
+        position_error, velocity_error = self._noise * self._rng.standard_normal((2, 7))
+        message.joint_position = plant.GetPositions(context, self._arm) + since * velocity + position_error
+        message.joint_velocity = velocity + velocity_error
+        message.joint_position_desired = robot.q_d
+        message.joint_velocity_desired = robot.v_d
+        message.joint_acceleration_desired = robot.a_d
         message.joint_torque = torque
         message.joint_torque_desired = torque
         # libfranka tells what the arm does to the world, Drake what the world does to the arm.
         message.joint_torque_external = -self._external
-        message.control_command_success_rate = 1.0
-        message.robot_mode = driver.robot_mode
+        message.control_command_success_rate = float(robot.mode == MOVE)
+        message.robot_mode = robot.mode
         return message  # control_mode stays 0: the driver never sets it
 
     def _desired_state(self) -> NDArray[np.float64]:
-        return np.concatenate([self.driver.q_d, self.driver.v_d])
+        return np.concatenate([self.driver.robot.q_d, self.driver.robot.v_d])

@@ -1,6 +1,6 @@
 """Both drivers as they behave on LCM, each around its half of the simulated world."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,7 +14,7 @@ from riseg_drake.stations.ground_truth import LABEL_CHANNEL, POSE_CHANNEL, encod
 from riseg_drake.stations.lcm_channels import LcmConfig
 from riseg_drake.stations.lcm_images import encode_images
 from riseg_drake.stations.misbehaviour import CONTROL_CHANNEL, UnreliableLink, Word, WordError, parse_word
-from riseg_drake.stations.panda_driver import PandaDriverConfig
+from riseg_drake.stations.panda_driver import DriverEnd, PandaDriverConfig
 
 _LONGEST_CATCHING_UP = 50_000  # us; if this process was kept from running for longer, time is skipped
 
@@ -36,10 +36,13 @@ class EmulatorConfig:
 
 
 class _Ears:
-    """Hears the words on the control channel, and keeps what there is to tell the operator."""
+    """Hears the words on the control channel, and keeps what there is to tell the operator.
 
-    def __init__(self, lcm: DrakeLcmInterface):
-        self._words: list[Word] = []
+    `faults` are words that hold from the start. They do not come by LCM, which keeps one message of a burst.
+    """
+
+    def __init__(self, lcm: DrakeLcmInterface, faults: Sequence[str]):
+        self._words = [parse_word(text) for text in faults]
         self._notes: list[str] = []
         lcm.Subscribe(CONTROL_CHANNEL, self._hear)
 
@@ -65,18 +68,30 @@ class _Ears:
 
 
 class PandaSide:
-    """The arm's driver: commands in, status out, around the physics of the world."""
+    """The arm's driver: commands in, status out, around the physics of the world.
 
-    def __init__(self, lcm: DrakeLcmInterface, config: EmulatorConfig, arm: EmulatedArm, seed: int):
+    While the driver's process is not there nothing is said or heard; the world goes on. `faults` are words that
+    hold from the start. Raises WordError.
+    """
+
+    def __init__(
+        self,
+        lcm: DrakeLcmInterface,
+        config: EmulatorConfig,
+        arm: EmulatedArm,
+        seed: int,
+        faults: Sequence[str] = (),
+    ):
         self.arm = arm
         self.published = 0
         """Status messages so far."""
         self._lcm = lcm
         self._channel = config.lcm.status_channel
         self._link = UnreliableLink(np.random.default_rng([seed, 1]))
-        self._ears = _Ears(lcm)
-        self._dead_until: int | None = None
-        self._mode = arm.driver.robot_mode
+        self._ears = _Ears(lcm, faults)
+        self._restarts_at: int | None = None
+        self._was_connected = True
+        self._told: DriverEnd | None = None
         lcm.Subscribe(config.lcm.command_channel, self._hear)
 
     def _hear(self, raw: bytes) -> None:  # LCM calls this from C: nothing may be raised
@@ -85,18 +100,14 @@ class PandaSide:
         except Exception as error:  # whatever the decoder makes of bytes that are no command
             self._ears.note(f"a message that is no lcmt_panda_command was ignored ({error})")
             return
-        if self._dead_until is None:
-            self.arm.driver.receive(command)
+        self.arm.driver.receive(command)
 
     def notes(self) -> list[str]:
         """What happened since the last call, a line each."""
         return self._ears.notes()
 
     def advance(self, wall_us: int) -> None:
-        """Let the world come up to a wall time, microseconds, and publish the status of its last tick.
-
-        Raises DriverEndedError where the real driver would end.
-        """
+        """Let the world come up to a wall time, microseconds, and publish the status of its last tick."""
         now = 1e-6 * wall_us
         behind = wall_us - self.arm.wall_us
         if behind > _LONGEST_CATCHING_UP:
@@ -105,43 +116,67 @@ class PandaSide:
             self._lcm.HandleSubscriptions(0)
         for word in self._ears.words("arm", "status"):
             self._obey(word, wall_us)
-        if self._dead_until is not None and wall_us >= self._dead_until:
-            self._dead_until = None
-            self.arm.driver.restart()
-            self._ears.note("the driver is back")
+        if self._restarts_at is not None and wall_us >= self._restarts_at:
+            self._restarts_at = None
+            self.arm.driver.robot.recover()
+            self._start(wall_us)
         ticks = 0
         while self.arm.wall_us + TICK_US <= wall_us:
             self.arm.tick()
             ticks += 1
-        self._tell_mode()
-        if ticks and self._dead_until is None:
+        self._tell()
+        if ticks and self.arm.driver.is_connected:
             self._link.send(self.arm.status().encode(), now)
         for message in self._link.due(now):
             self._lcm.Publish(self._channel, message)
             self.published += 1
 
     def _obey(self, word: Word, wall_us: int) -> None:
-        driver = self.arm.driver
+        driver, robot = self.arm.driver, self.arm.driver.robot
         match word.subject, word.verb:
             case "status", _:
                 self._link.obey(word, 1e-6 * wall_us)
             case _, "reflex":
-                driver.enter_reflex("asked for")
+                robot.enter_reflex("asked for")
             case _, "stop":
-                driver.user_stop()
+                robot.user_stop()
             case _, "recover":
-                driver.restart()
+                robot.recover()
+                self._ears.note(f"robot_mode is {robot.mode}")
+            case _, "start":
+                self._start(wall_us)
+            case _, "guide":
+                self._guide(np.array(word.posture))
             case _, "die":
-                driver.die()
-                self._dead_until = wall_us + int(1e6 * word.amount)
-                self._ears.note(f"the driver is dead for {word.amount:g} s")
+                driver.kill()
+                self._restarts_at = wall_us + int(1e6 * word.amount) if word.amount else None
 
-    def _tell_mode(self) -> None:
+    def _start(self, wall_us: int) -> None:
+        is_new = self.arm.driver.start(wall_us)
+        self._ears.note("the driver is starting" if is_new else "the driver is there already")
+
+    def _guide(self, posture: NDArray) -> None:
+        robot = self.arm.driver.robot
+        goal = robot.q_d.copy()
+        if len(posture) == 2:
+            goal[int(posture[0]) - 1] += posture[1]
+        else:
+            goal = posture
+        try:
+            robot.guide(goal)
+            self._ears.note("the arm is guided by hand")
+        except ValueError as error:
+            self._ears.note(f"the arm is not guided: {error}")
+
+    def _tell(self) -> None:
+        """Note when the driver has come, or gone."""
         driver = self.arm.driver
-        if driver.robot_mode != self._mode:
-            self._mode = driver.robot_mode
-            reason = f" ({driver.reflex_reason})" if driver.reflex_reason else ""
-            self._ears.note(f"robot_mode is {self._mode}{reason}")
+        if driver.end is not None and driver.end is not self._told:
+            self._told = driver.end
+            self._ears.note(f"the driver ended, {driver.end}; say 'start' to start it again")
+        if driver.is_connected and not self._was_connected:
+            self._ears.note(f"the driver is back, robot_mode is {driver.robot.mode}")
+        self._was_connected = driver.is_connected
 
 
 @dataclass(frozen=True)
@@ -157,16 +192,26 @@ class Moment:
 
 
 class CameraSide:
-    """The camera's driver: pictures out, and the truth about them on channels of its own."""
+    """The camera's driver: pictures out, and the truth about them on channels of its own.
 
-    def __init__(self, lcm: DrakeLcmInterface, config: EmulatorConfig, camera: EmulatedCamera, seed: int):
+    `faults` are words that hold from the start. Raises WordError.
+    """
+
+    def __init__(
+        self,
+        lcm: DrakeLcmInterface,
+        config: EmulatorConfig,
+        camera: EmulatedCamera,
+        seed: int,
+        faults: Sequence[str] = (),
+    ):
         self.published = 0
         """Pictures so far, before any went astray."""
         self._lcm = lcm
         self._config = config
         self._camera = camera
         self._link = UnreliableLink(np.random.default_rng([seed, 2]))
-        self._ears = _Ears(lcm)
+        self._ears = _Ears(lcm, faults)
 
     def show(self, moment: Moment, now: float) -> None:
         """Take a picture of the world as it was at a moment; `now` is the wall time, s."""

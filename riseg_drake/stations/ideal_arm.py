@@ -33,13 +33,12 @@ class IdealArm:
         self._lcm = open_lcm(config)
         self._lcm.Subscribe(config.command_channel, self._take)
         self.position: NDArray[np.float64] = np.array(READY)
-        """Joint angles, rad [7]: those of the last command."""
+        """Joint angles, rad [7]: where the commands have brought it."""
         self.mode: int = lcmt_panda_status.kMove
         self.torque_external: NDArray[np.float64] = np.zeros(7)
         """N m [7]"""
-        self._velocity: NDArray[np.float64] = np.zeros(7)
         self.commands: list[tuple[float, NDArray[np.float64]]] = []
-        """Stamps, s, of all commands so far, and the joint angles, rad [7], that it was told to be at then."""
+        """Stamps, s, of all commands so far, and what they said, rad or rad/s [7]."""
 
     def speak(self) -> None:
         """Publish a status of now, and take in what has come."""
@@ -63,8 +62,9 @@ class IdealArm:
         stamp = 1e-6 * command.utime
         if command.num_joint_velocity:
             if self.commands:
-                self.position = self.position + (stamp - self.commands[-1][0]) * self._velocity
-            self._velocity = np.array(command.joint_velocity)
+                before, velocity = self.commands[-1]
+                self.position = self.position + (stamp - before) * velocity
+            self.commands.append((stamp, np.array(command.joint_velocity)))
         else:
             self.position = np.array(command.joint_position)
-        self.commands.append((stamp, self.position))
+            self.commands.append((stamp, self.position))

@@ -13,12 +13,13 @@ CONTROL_CHANNEL = "RISEG_EMULATOR_CONTROL"
 STREAMS = ("images", "status")
 WORDS = (
     "images|status drop SHARE, delay SECONDS, duplicate SHARE, reorder SHARE, or stall SECONDS; reflex; "
-    "stop; recover; die SECONDS"
+    "stop; recover; die; die SECONDS; start; guide JOINT RADIANS; guide RADIANS (7 of them)"
 )
 """All that can be said, for people."""
 
-_REST_OF_ARM = ("reflex", "stop", "recover")
-_LONGEST = 60.0
+_OF_ARM = ("reflex", "stop", "recover", "die", "start")
+_LONGEST = 60.0  # s
+_TURN = 6.3  # rad
 
 
 class WordError(ValueError):
@@ -46,16 +47,23 @@ class Word:
     subject: str
     """`images`, `status` or `arm`."""
     verb: str
-    """A field of Faults, `stall`, `die`, or one of `reflex`, `stop` (by the user) and `recover`."""
+    """A field of Faults, `stall`, `reflex`, `stop` (the button), `recover`, `die`, `start` or `guide`."""
     amount: float = 0.0
     """A share, or seconds."""
+    posture: tuple[float, ...] = ()
+    """Of `guide`: 7 joint angles, rad, or the number of a joint, 1 to 7, and by how much it is turned, rad."""
 
 
 def parse_word(text: str) -> Word:
     """What a person or program said, such as `images drop 0.1` or `reflex`. Raises WordError."""
     match text.split():
-        case [verb] if verb in _REST_OF_ARM:
+        case [verb] if verb in _OF_ARM:
             return Word("arm", verb)
+        case ["guide", joint, angle] if joint in set("1234567"):
+            return Word("arm", "guide", posture=(float(joint), _number(angle, _TURN, text, -_TURN)))
+        case ["guide", *angles] if len(angles) == 7:
+            posture = tuple(_number(angle, _TURN, text, -_TURN) for angle in angles)
+            return Word("arm", "guide", posture=posture)
         case ["die", seconds]:
             return Word("arm", "die", _number(seconds, _LONGEST, text))
         case [stream, "stall" | "delay" as verb, seconds] if stream in STREAMS:
@@ -65,13 +73,13 @@ def parse_word(text: str) -> Word:
     raise WordError(f"{text.strip()!r} is not known to the emulator; it knows {WORDS}")
 
 
-def _number(text: str, most: float, said: str) -> float:
+def _number(text: str, most: float, said: str, least: float = 0.0) -> float:
     try:
         number = float(text)
     except ValueError:
-        number = -1.0
-    if not 0 <= number <= most:
-        raise WordError(f"{said.strip()!r}: {text} is not a number from 0 to {most:g}")
+        number = np.nan
+    if not least <= number <= most:
+        raise WordError(f"{said.strip()!r}: {text} is not a number from {least:g} to {most:g}")
     return number
 
 

@@ -1,16 +1,16 @@
 """Would a stream of commands be smooth enough for a Panda? Judged as it was planned, by its stamps.
 
 Stricter than drake-franka-driver, on purpose. There a rate limiter stands between the commands and the robot
-(`limit_rate`, see panda_driver.py), so that a step makes the arm jerk and overshoot, but hardly ever stops it;
+(`limit_rate`, see rate_limiter.py), so that a step makes the arm jerk and overshoot, but hardly ever stops it;
 other drivers have none, and a client that needs one has planned something that the arm cannot do.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.robot.limits import PANDA_LIMITS
+from riseg_drake.robot.limits import RobotLimits
+from riseg_drake.stations.rate_limiter import TICK
 
-_TICK = 1e-3  # s, of the robot
 _WINDOW = 0.025  # s; acceleration is judged by the mean speeds in two of them, one after the other
 _LONG_WINDOW = 0.1  # s; speed is judged by its mean in one of these
 _LONGEST_PREDICTION = 0.05  # s; after a longer gap no more deviation is forgiven
@@ -25,7 +25,8 @@ class StreamJudge:
     that is always forgiven, rad (for velocities 20 times this, rad/s).
     """
 
-    def __init__(self, is_velocity: bool, jitter: float, step: float):
+    def __init__(self, limits: RobotLimits, is_velocity: bool, jitter: float, step: float):
+        self._limits = limits
         self._is_velocity = is_velocity
         self._jitter, self._step = jitter, step
         self._stream: list[tuple[int, NDArray]] = []  # stamps in us, and targets
@@ -40,37 +41,40 @@ class StreamJudge:
         """Nobody listened for some time: what comes next is taken as it is, until its speed is known again."""
         self._stream, self._missed = [], True
 
-    def judge(self, target: NDArray, utime: int, held: NDArray, longest_gap: float) -> str:
+    def judge(self, target: NDArray, utime: int, held: NDArray, longest_gap: float, q: NDArray) -> str:
         """What is wrong with a target [7] stamped `utime`, us, after `held` [7]; "" if nothing is.
+
+        `q` [7] is where the robot sets itself, rad.
 
         In libfranka's words, without their `joint_motion_generator_`. A gap longer than `longest_gap`, s, or
         the first target of all, begins a new stream at rest.
         """
         if self._missed:
             self._missed, self._unknown_until = False, utime + int(1e6 * _LONG_WINDOW)
-        reason = self._compare(target, utime, held, longest_gap) if utime > self._unknown_until else ""
+        reason = self._compare(target, utime, held, longest_gap, q) if utime > self._unknown_until else ""
         if not reason:
             earliest = utime - int(2e6 * _LONG_WINDOW)
             self._stream = [item for item in self._stream if earliest <= item[0] < utime] + [(utime, target)]
         return reason
 
-    def _compare(self, target: NDArray, utime: int, held: NDArray, longest_gap: float) -> str:
-        gap = np.inf if not self._stream else max((utime - self._stream[-1][0]) / 1e6, _TICK)
-        reason = self._break(target, gap) if gap <= longest_gap else "velocity_discontinuity"
+    def _compare(self, target: NDArray, utime: int, held: NDArray, longest_gap: float, q: NDArray) -> str:
+        gap = np.inf if not self._stream else max((utime - self._stream[-1][0]) / 1e6, TICK)
+        reason = self._break(target, gap, q) if gap <= longest_gap else "velocity_discontinuity"
         if reason and gap > _LONGEST_HELD:  # the arm has been braking since, or stood still
             resting = np.zeros(7) if self._is_velocity else held + np.clip(target - held, -_NEAR, _NEAR)
             self._stream = [(utime - int(1e6 * age), resting) for age in (2 * _LONG_WINDOW, 0.005)]
-            reason = self._break(target, 0.005)
+            reason = self._break(target, 0.005, q)
         return reason
 
-    def _break(self, target: NDArray, gap: float) -> str:
-        return self._velocity_break(target, gap) if self._is_velocity else self._position_break(target, gap)
+    def _break(self, target: NDArray, gap: float, q: NDArray) -> str:
+        return self._velocity_break(target, gap, q) if self._is_velocity else self._position_break(target, gap)
 
-    def _velocity_break(self, v: NDArray, gap: float) -> str:
-        """What is wrong with a velocity [7] that comes `gap` s after the last; "" if nothing is."""
-        if (np.abs(v) > PANDA_LIMITS.velocity).any():
+    def _velocity_break(self, v: NDArray, gap: float, q: NDArray) -> str:
+        """What is wrong with a velocity [7] that comes `gap` s after the last at q; "" if nothing is."""
+        lower, upper = self._limits.velocity_range(q)
+        if ((v < lower) | (v > upper)).any():
             return "velocity_limits_violation"
-        most = PANDA_LIMITS.acceleration * (min(gap, _LONGEST_PREDICTION) + self._jitter)
+        most = self._limits.acceleration * (min(gap, _LONGEST_PREDICTION) + self._jitter)
         jump = np.abs(v - self._stream[-1][1]) > most + 20 * self._step
         return "acceleration_discontinuity" if jump.any() else ""
 
@@ -81,19 +85,21 @@ class StreamJudge:
         v, v_earlier = (q1 - q2) / _WINDOW, (q2 - q3) / _WINDOW
         change = np.abs(v - v_earlier)
         forgiven = (
-            PANDA_LIMITS.acceleration * min(gap, _LONGEST_PREDICTION) ** 2
+            self._limits.acceleration * min(gap, _LONGEST_PREDICTION) ** 2
             + change * gap  # the mean speed of a window lags behind while it grows
             + 2 * jitter * np.abs(v)
             + self._step
         )
         if (np.abs(q - q1 - v * gap) > forgiven).any():
             return "velocity_discontinuity"
-        if not PANDA_LIMITS.contains(q):
+        if not self._limits.contains(q):
             return "position_limits_violation"
-        most = PANDA_LIMITS.acceleration * (_WINDOW + jitter) + 2 * jitter / _WINDOW * np.abs(v) + 0.02
+        most = self._limits.acceleration * (_WINDOW + jitter) + 2 * jitter / _WINDOW * np.abs(v) + 0.02
         if (change > most).any():
             return "acceleration_discontinuity"
-        if (np.abs(q1 - q4) > PANDA_LIMITS.velocity * (_LONG_WINDOW + 2 * jitter)).any():
+        lower, upper = self._limits.velocity_range(q4)  # where the joint was farthest from where it goes
+        mean = (q1 - q4) / (_LONG_WINDOW + 2 * jitter)
+        if ((mean < lower) | (mean > upper)).any():
             return "velocity_limits_violation"
         return ""
 

@@ -1,10 +1,12 @@
 """Two processes on the real network; every wait ends with a message or with the deadline of the test."""
 
+import json
 import os
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -15,7 +17,8 @@ from riseg_drake.app.cli import main
 from riseg_drake.stations.ground_truth import LABEL_CHANNEL, decode_labels
 from riseg_drake.stations.lcm_images import decode_images
 from riseg_drake.stations.misbehaviour import CONTROL_CHANNEL
-from riseg_drake.stations.panda_driver import MOVE, REFLEX
+from riseg_drake.stations.motion_judge import MotionVerdict
+from riseg_drake.stations.panda_robot import MOVE
 
 DEADLINE = 60.0  # s, for anything that is waited for
 
@@ -49,6 +52,24 @@ class Client:
             each_time()
             self.lcm.HandleSubscriptions(5)
 
+    def until_more(self, what):
+        """Of `pictures` or `statuses`."""
+        before = getattr(self, what)
+        self.until(lambda: getattr(self, what) > before)
+
+    def until_silent(self, each_time):
+        """No status has come for half a second of this process; `each_time` is done meanwhile."""
+        still = 0
+
+        def is_silent():
+            nonlocal still
+            still = still + 1 if self.statuses == self._before else 0
+            self._before = self.statuses
+            return still > 100
+
+        self._before = self.statuses
+        self.until(is_silent, each_time)
+
     def command(self, q, mode=1):
         message = lcmt_panda_command()
         message.utime, message.control_mode_expected = int(1e6 * time.time()), mode
@@ -79,11 +100,15 @@ def emulator(tmp_path):
     url = f"udpm://239.255.76.67:{20000 + os.getpid() % 20000}?ttl=0&recv_buf_size=4194304"
     scenario = tmp_path / "one_toy.yaml"
     scenario.write_text(
-        f"station: {{scene: {{count_min: 1, count_max: 1}}}}\nemulator: {{lcm: {{url: '{url}'}}, rate: 5.0}}\n"
+        "station: {scene: {count_min: 1, count_max: 1}}\n"
+        f"emulator: {{lcm: {{url: '{url}'}}, driver: {{control_mode: position}}, rate: 5.0}}\n"
     )
     client = Client(url)
     process = subprocess.Popen(
-        [sys.executable, "-m", "riseg_drake", "emulate", str(scenario), "--fault", "images duplicate 0.2"],
+        [
+            *(sys.executable, "-m", "riseg_drake", "emulate", str(scenario)),
+            *("--fault", "images duplicate 0.2", "--judge", str(tmp_path / "verdict.json")),
+        ],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -109,18 +134,25 @@ def test_a_client_moves_the_arm_sees_pictures_and_is_taught_manners(emulator):
     assert client.status.robot_mode == MOVE
     client.move(np.full(7, 0.02))
     assert client.status.robot_mode == MOVE
-    client.until(lambda: client.status.robot_mode == REFLEX, lambda: client.command(np.zeros(7)))
-    assert main(["emulate", str(scenario), "--say", "recover"]) == 0
-    client.until(lambda: client.status.robot_mode == MOVE)
-
     q = client.status.joint_position_desired
-    client.until(lambda: process.poll() is not None, lambda: client.command(q, mode=2))
-    out, err = process.communicate()
-    assert process.returncode == 2
-    assert err.splitlines() == [
-        "riseg: control_mode_expected is 2, but the driver runs with --control_mode=position, which is 1"
-    ]
-    assert "robot_mode is 4 (joint_motion_generator_velocity_discontinuity)" in " ".join(out.split())
+    for spoil in (lambda: client.command(np.zeros(7)), lambda: client.command(q, mode=2)):
+        client.until_silent(spoil)
+        client.until_more("pictures")  # the world goes on
+        assert main(["emulate", str(scenario), "--say", "start"]) == 0
+        client.until_more("statuses")
+        assert client.status.robot_mode == MOVE
+
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=DEADLINE)
+    said = " ".join(out.split())
+    assert (process.returncode, err) == (0, "")
+    assert "exit code 0: reflex joint_motion_generator_velocity_discontinuity" in said
+    assert "exit code 0: control_mode_expected is 2, but the driver runs with --control_mode=position" in said
+    assert "acceleration" in said
+    verdict = json.loads((scenario.parent / "verdict.json").read_text())
+    assert set(verdict) == {field.name for field in fields(MotionVerdict)}
+    assert verdict["seconds"] > 0.3  # 0.02 rad at 0.04 rad/s
+    assert 0 < verdict["acceleration_rms"] < verdict["acceleration_largest"] <= 1 + 1e-9
 
 
 @pytest.mark.renders

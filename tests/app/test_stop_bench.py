@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from riseg_drake.app.stop_bench import judged
+from riseg_drake.app.stop_bench import NoMotionError, judged
 from riseg_drake.robot.command_stream import CommandParameters
 from riseg_drake.robot.limits import PANDA_LIMITS
 
@@ -14,9 +14,8 @@ ALLOWED = PARAMETERS.limits.stop_acceleration * PANDA_LIMITS.acceleration[0]
 def commands(deceleration: float, speed: float = 0.4, cause: float = 1.0) -> list[tuple[float, np.ndarray]]:
     """Joint 1 goes at one speed, rad/s, and from the cause on ever slower, rad/s^2."""
     stamps = np.arange(400) / PARAMETERS.rate
-    after = np.clip(stamps - cause, 0, speed / deceleration)
-    angle = speed * (np.minimum(stamps, cause) + after) - 0.5 * deceleration * after**2
-    return [(100 + t, np.array([q, 0, 0, 0, 0, 0, 0])) for t, q in zip(stamps, angle, strict=True)]
+    velocity = speed - deceleration * np.clip(stamps - cause, 0, speed / deceleration)
+    return [(100 + t, np.array([v, 0, 0, 0, 0, 0, 0])) for t, v in zip(stamps, velocity, strict=True)]
 
 
 @pytest.mark.parametrize("share", [0.3, 0.9, 1.5])
@@ -32,6 +31,8 @@ def test_a_command_that_was_lost_does_not_look_like_acceleration():
     assert judged(sent, 101.0, PARAMETERS, PANDA_LIMITS).acceleration == pytest.approx(0.5, rel=0.1)
 
 
-def test_an_arm_that_never_moved_proves_nothing():
-    with pytest.raises(RuntimeError, match="did not move"):
-        judged([(t / 200, np.zeros(7)) for t in range(100)], 0.3, PARAMETERS, PANDA_LIMITS)
+@pytest.mark.parametrize("cause", [100.5, 101.5])
+def test_an_arm_that_stood_still_already_or_always_proves_nothing(cause):
+    still = [(t, 0 * v) for t, v in commands(ALLOWED)] if cause < 101 else commands(ALLOWED)
+    with pytest.raises(NoMotionError, match="did not move"):
+        judged(still, cause, PARAMETERS, PANDA_LIMITS)

@@ -81,6 +81,9 @@ class Swinging:
                 t = self.targets * 0.01
                 self.commands.send_target(self.start + t, READY + 0.2 * (1 - np.cos(2 * t)))
                 self.targets += 1
+            report = self.commands.report if plans else None
+            if report and report.state.mode is Mode.STOPPED and report.words == self.commands.words:
+                self.commands.release()  # a busy computer may keep the arm from speaking for too long
             self.arm.speak()
             self.arm.show()
             self.ears.HandleSubscriptions(0)

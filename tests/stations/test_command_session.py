@@ -104,6 +104,17 @@ class Arm:
         )
 
 
+def test_the_time_that_a_process_takes_to_get_ready_is_not_taken_for_the_end_of_a_driver():
+    arm = Arm()
+    arm.session.hear_status(arm.status().encode())  # LCM keeps the first that comes, and only that
+    arm.now, arm.speaks = 0.6, False
+    arm.session.set_out(STEADY + arm.now)
+    arm.round()
+    arm.speaks = True
+    arm.run(0.1)
+    assert arm.stream.state.mode is Mode.FOLLOWING
+
+
 def swinging(mode="velocity"):
     """In the middle of a fast motion."""
     arm = Arm(mode).run(1.6)

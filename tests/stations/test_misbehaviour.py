@@ -77,7 +77,11 @@ def test_a_stalled_sender_says_nothing_until_it_wakes():
         ("reflex", Word("arm", "reflex")),
         ("stop", Word("arm", "stop")),
         ("recover", Word("arm", "recover")),
+        ("die", Word("arm", "die")),
         ("die 2", Word("arm", "die", 2.0)),
+        ("start", Word("arm", "start")),
+        ("guide 1 -0.3", Word("arm", "guide", posture=(1.0, -0.3))),
+        ("guide 0 0.1 0 -2 0 2 0.7", Word("arm", "guide", posture=(0, 0.1, 0, -2, 0, 2, 0.7))),
     ],
 )
 def test_words_are_understood(text, word):
@@ -85,7 +89,21 @@ def test_words_are_understood(text, word):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "images", "images drop", "images drop 2", "images drop -1", "arm drop 0.1", "die", "die soon"]
+    "text",
+    [
+        "",
+        "images",
+        "images drop",
+        "images drop 2",
+        "images drop -1",
+        "arm drop 0.1",
+        "die soon",
+        "guide 8 0.3",
+        "guide 1",
+        "guide 1 nan",
+        "guide 1 2 3",
+        "start 2",
+    ],
 )
 def test_other_words_are_refused_in_one_line(text):
     with pytest.raises(WordError) as caught:

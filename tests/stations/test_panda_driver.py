@@ -4,16 +4,8 @@ from drake import lcmt_panda_command
 
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.limits import PANDA_LIMITS
-from riseg_drake.stations.panda_driver import (
-    IDLE,
-    MOVE,
-    REFLEX,
-    USER_STOPPED,
-    DriverEndedError,
-    PandaDriver,
-    PandaDriverConfig,
-    limit_rate,
-)
+from riseg_drake.stations.panda_driver import ABORTED, ENDED, KILLED, PandaDriver, PandaDriverConfig
+from riseg_drake.stations.panda_robot import GUIDING, HAND_SPEED, IDLE, MOVE, REFLEX, USER_STOPPED
 
 START = 1_700_000_000_000_000  # us
 SHOULDER = np.array([0, 1.0, 0, 0, 0, 0, 0])
@@ -35,9 +27,9 @@ def command(mode, values, utime, **changes):
 class Session:
     """A driver, and a client that sends at 200 Hz."""
 
-    def __init__(self, mode="position"):
+    def __init__(self, mode="position", **config):
         self.mode = mode
-        self.driver = PandaDriver(PandaDriverConfig(control_mode=mode), READY)
+        self.driver = PandaDriver(PandaDriverConfig(control_mode=mode, **config), READY, PANDA_LIMITS)
         self.now = START
 
     def wait(self, ticks):
@@ -51,8 +43,21 @@ class Session:
         return self.wait(ticks)
 
     @property
-    def mode_now(self):
-        return self.driver.robot_mode
+    def robot(self):
+        return self.driver.robot
+
+    @property
+    def follows(self):
+        return self.driver.end is None and self.robot.mode == MOVE
+
+    @property
+    def is_reflex(self):
+        end = self.driver.end
+        return end is not None and (end.code, end.reason[:6], self.robot.mode) == (ENDED, "reflex", IDLE)
+
+    def start(self):
+        assert self.driver.start(self.now)
+        return self.wait(round(1e3 * self.driver.config.startup))
 
 
 def smooth(share):
@@ -66,9 +71,10 @@ def swing(duration, amplitude):
 
 
 def test_before_any_command_the_arm_stands_where_it_is():
-    driver = Session().wait(100).driver
-    assert driver.robot_mode == MOVE
-    np.testing.assert_array_equal(driver.q_d, READY)
+    session = Session().wait(100)
+    assert session.driver.is_connected
+    assert session.robot.mode == MOVE
+    np.testing.assert_array_equal(session.robot.q_d, READY)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -84,9 +90,9 @@ def test_a_smooth_stream_with_jitter_and_lost_messages_is_followed(seed):
             session.wait(5)
         else:
             session.send(path(t), stamp_error=error)
-        assert session.mode_now == MOVE, session.driver.reflex_reason
-        worst = max(worst, np.abs(session.driver.q_d - path(t)).max())
-    np.testing.assert_allclose(session.driver.q_d, READY + 0.35, atol=1e-4)
+        assert session.follows, session.robot.reflex_reason
+        worst = max(worst, np.abs(session.robot.q_d - path(t)).max())
+    np.testing.assert_allclose(session.robot.q_d, READY + 0.35, atol=1e-4)
     assert worst < 0.012
 
 
@@ -96,36 +102,34 @@ def test_the_arm_follows_a_ramp_with_the_lag_of_the_filter():
     for k in range(400):
         t = 0.005 * k
         session.send(READY + rate * max(0.0, t - 0.5 * (1 - np.exp(-t / 0.5))))
-    lag = (READY[0] + rate * (t - 0.5 * (1 - np.exp(-t / 0.5)))) - session.driver.q_d[0]
+    lag = (READY[0] + rate * (t - 0.5 * (1 - np.exp(-t / 0.5)))) - session.robot.q_d[0]
     # The pole that 1 / (2 pi 30 Hz) = 5.3 ms gives, seen 5 ms after the step of the held command.
     assert 0 < lag < rate * 0.0053
-    assert session.driver.v_d[0] == pytest.approx(rate, rel=0.6)
+    assert session.robot.v_d[0] == pytest.approx(rate, rel=0.6)
 
 
 @pytest.mark.parametrize("step", [0.002, 0.01, 0.1])
 def test_a_step_from_rest_is_a_reflex_and_a_tiny_one_is_not(step):
     session = Session().send(READY).send(READY)
-    assert session.send(READY + 1e-4).mode_now == MOVE
+    assert session.send(READY + 1e-4).follows
     session.send(READY + 1e-4 + step)
-    assert (session.mode_now, session.driver.reflex_reason) == (
-        REFLEX,
-        "joint_motion_generator_velocity_discontinuity",
-    )
-    assert np.abs(session.wait(200).driver.q_d - READY).max() < 2e-4  # nothing of the step was done
+    assert session.is_reflex
+    assert session.robot.reflex_reason == "joint_motion_generator_velocity_discontinuity"
+    assert np.abs(session.wait(200).robot.q_d - READY).max() < 2e-4  # nothing of the step was done
 
 
 def test_a_first_command_far_from_the_present_position_is_a_reflex():
-    assert Session().wait(50).send(READY + 0.01).mode_now == REFLEX
+    assert Session().wait(50).send(READY + 0.01).is_reflex
 
 
 def test_a_stop_from_one_command_to_the_next_is_a_reflex():
     path, session = swing(1.0, 0.35), Session()
     for k in range(100):
         session.send(path(0.005 * k))
-    assert session.mode_now == MOVE
+    assert session.follows
     for _ in range(10):
         session.send(path(0.005 * 99))
-    assert session.mode_now == REFLEX
+    assert session.is_reflex
 
 
 def test_smooth_but_too_fast_or_too_hard_is_a_reflex():
@@ -136,7 +140,7 @@ def test_smooth_but_too_fast_or_too_hard_is_a_reflex():
         path, session = swing(duration, amplitude), Session()
         for k in range(int(duration / 0.005)):
             session.send(path(0.005 * k))
-        assert reason in session.driver.reflex_reason
+        assert reason in session.robot.reflex_reason
 
 
 def test_just_within_the_limits_is_no_reflex():
@@ -146,15 +150,15 @@ def test_just_within_the_limits_is_no_reflex():
     path, session = swing(duration, np.array([1, 0, 0, 0, 0, 0, 0]) * amplitude), Session()
     for k in range(260):
         session.send(path(0.005 * k))
-    assert session.mode_now == MOVE, session.driver.reflex_reason
+    assert session.follows, session.robot.reflex_reason
 
 
 def test_leaving_the_joint_range_is_a_reflex():
     session = Session()
     for k in range(2000):
         session.send(READY + WRIST * 3.5 * smooth(min(1.0, k / 1600)))
-    assert session.driver.reflex_reason == "joint_motion_generator_position_limits_violation"
-    assert PANDA_LIMITS.contains(session.wait(200).driver.q_d, margin=-0.01)  # it had to brake
+    assert session.robot.reflex_reason == "joint_motion_generator_position_limits_violation"
+    assert PANDA_LIMITS.contains(session.wait(200).robot.q_d, margin=-0.01)  # it had to brake
 
 
 def test_an_expired_position_holds_and_the_stream_may_go_on_from_there():
@@ -163,9 +167,9 @@ def test_an_expired_position_holds_and_the_stream_may_go_on_from_there():
         session.send(path(0.005 * k))
     held = path(0.005 * 59)
     session.wait(700)
-    np.testing.assert_allclose(session.driver.q_d, held, atol=1e-5)
-    assert session.send(held).send(held).mode_now == MOVE
-    assert session.wait(300).send(held + 0.01).mode_now == REFLEX
+    np.testing.assert_allclose(session.robot.q_d, held, atol=1e-5)
+    assert session.send(held).send(held).follows
+    assert session.wait(300).send(held + 0.01).is_reflex
 
 
 def test_what_a_driver_that_was_kept_from_running_has_missed_is_not_held_against_the_client():
@@ -176,8 +180,8 @@ def test_what_a_driver_that_was_kept_from_running_has_missed_is_not_held_against
     session.driver.miss()
     for k in range(100, 240):
         session.send(path(0.005 * k))
-        assert session.mode_now == MOVE, session.driver.reflex_reason
-    assert session.send(READY).mode_now == REFLEX  # it judges again
+        assert session.follows, session.robot.reflex_reason
+    assert session.send(READY).is_reflex  # it judges again
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -191,70 +195,51 @@ def test_a_stream_that_paused_may_go_on_or_begin_at_rest_and_nothing_else(mode):
             position = position + 0.005 * speed(0.005 * k)
             session.send(position if mode == "position" else np.full(7, speed(0.005 * k)))
         session.wait(pause)
-        return session.send(following(position) if mode == "position" else following(0.0)).mode_now
+        return session.send(following(position) if mode == "position" else following(0.0))
 
     if mode == "position":
-        assert paused(45, lambda q: q + 0.05 * 0.3) == MOVE  # where it should be by now
-        assert paused(45, lambda q: q) == paused(80, lambda q: q) == MOVE
-        assert paused(10, lambda q: q) == REFLEX  # a stop from full speed
-        assert paused(80, lambda q: q - 0.02) == REFLEX
+        assert paused(45, lambda q: q + 0.05 * 0.3).follows  # where it should be by now
+        assert paused(45, lambda q: q).follows
+        assert paused(80, lambda q: q).follows
+        assert paused(10, lambda q: q).is_reflex  # a stop from full speed
+        assert paused(80, lambda q: q - 0.02).is_reflex
     else:
-        assert paused(45, lambda v: np.full(7, 0.3)) == paused(80, lambda v: np.zeros(7)) == MOVE
-        assert paused(10, lambda v: np.zeros(7)) == REFLEX
-        assert paused(80, lambda v: np.full(7, -0.3)) == REFLEX
-
-
-def test_rates_are_limited_as_by_libfranka():
-    # A step of velocity: jerk takes 2 ms to the full acceleration, which then holds.
-    v, a, speeds = np.zeros(7), np.zeros(7), []
-    for _ in range(20):
-        v_next = limit_rate(np.full(7, 1.0), v, a)
-        v, a = v_next, (v_next - v) / 1e-3
-        speeds.append(v)
-    ticks = np.arange(1, 21)
-    expected = np.cumsum(np.minimum(0.5 * ticks, 1.0)) * 1e-3 * PANDA_LIMITS.acceleration[0]
-    np.testing.assert_allclose(np.array(speeds)[:, 0], expected, rtol=1e-9)
-
-
-def test_the_greatest_speed_is_neared_and_never_passed():
-    v, a = np.zeros(7), np.zeros(7)
-    for _ in range(1000):
-        v_next = limit_rate(np.full(7, 9.0), v, a)
-        v, a = v_next, (v_next - v) / 1e-3
-    assert (v <= PANDA_LIMITS.velocity).all()
-    np.testing.assert_allclose(v, PANDA_LIMITS.velocity, rtol=1e-3)
+        assert paused(45, lambda v: np.full(7, 0.3)).follows
+        assert paused(80, lambda v: np.zeros(7)).follows
+        assert paused(10, lambda v: np.zeros(7)).is_reflex
+        assert paused(80, lambda v: np.full(7, -0.3)).is_reflex
 
 
 def test_a_hold_at_speed_is_overshot_as_no_limiter_brakes_ahead_of_time():
     path, session = swing(1.0, 0.35), Session()
     for k in range(100):  # 0.66 rad/s
         session.send(path(0.005 * k))
-    farthest = max(session.wait(1).driver.q_d[1] for _ in range(500)) - path(0.005 * 99)[1]
+    farthest = max(session.wait(1).robot.q_d[1] for _ in range(500)) - path(0.005 * 99)[1]
     # Braking with 7.5 rad/s^2 takes 29 mm of arc; 30 Hz and the held command leave 5 of them.
     assert 0.012 < farthest < 0.03
     session.wait(1500)
-    np.testing.assert_allclose(session.driver.q_d, path(0.005 * 99), atol=1e-4)
+    np.testing.assert_allclose(session.robot.q_d, path(0.005 * 99), atol=1e-4)
 
 
 @pytest.mark.parametrize(("age_ms", "moves"), [(95, True), (105, False), (-105, False)])
 def test_a_command_expires_a_tenth_of_a_second_from_its_stamp_in_either_direction(age_ms, moves):
     session = Session("velocity")
     session.send(np.full(7, 0.05), stamp_error=-1000 * age_ms, ticks=2)
-    assert (np.abs(session.driver.v_d).max() > 0) == moves
+    assert (np.abs(session.robot.v_d).max() > 0) == moves
 
 
 def test_velocity_is_held_until_it_expires_and_then_ends_within_the_acceleration_limit():
     session = Session("velocity")
     for k in range(100):
         session.send(np.full(7, 0.3 * smooth(min(1.0, k / 60))))
-    np.testing.assert_allclose(session.driver.v_d, 0.3, atol=1e-3)
-    before = session.driver.q_d
+    np.testing.assert_allclose(session.robot.v_d, 0.3, atol=1e-3)
+    before = session.robot.q_d
     session.wait(90)
-    np.testing.assert_allclose(session.driver.q_d - before, 0.027, atol=1e-4)
-    speeds = [session.wait(1).driver.v_d for _ in range(150)]
+    np.testing.assert_allclose(session.robot.q_d - before, 0.027, atol=1e-4)
+    speeds = [session.wait(1).robot.v_d for _ in range(150)]
     np.testing.assert_allclose(speeds[-1], 0, atol=1e-6)
     assert (np.abs(np.diff(speeds, axis=0)) <= PANDA_LIMITS.acceleration * 1e-3 + 1e-12).all()
-    assert session.mode_now == MOVE
+    assert session.follows
 
 
 @pytest.mark.parametrize(
@@ -263,12 +248,8 @@ def test_velocity_is_held_until_it_expires_and_then_ends_within_the_acceleration
 )
 def test_a_jump_of_velocity_is_a_reflex(values, reason):
     session = Session("velocity").send(np.zeros(7)).send(values)
-    assert session.mode_now == REFLEX
-    assert reason in session.driver.reflex_reason
-
-
-def spoiled(mode, **changes):
-    return lambda session: session.send(READY if mode == "position" else np.zeros(7), **changes)
+    assert session.is_reflex
+    assert reason in session.robot.reflex_reason
 
 
 @pytest.mark.parametrize(
@@ -287,37 +268,148 @@ def spoiled(mode, **changes):
     ],
 )
 def test_the_driver_ends_on_a_command_it_was_not_started_for(mode, changes, words):
-    with pytest.raises(DriverEndedError, match=words):
-        spoiled(mode, **changes)(Session(mode))
+    session = Session(mode).send(READY if mode == "position" else np.zeros(7), **changes)
+    assert (session.driver.end.code, session.robot.mode) == (ENDED, IDLE)
+    assert words in session.driver.end.reason
 
 
 def test_a_wrong_mode_ends_the_driver_even_when_expired_but_a_wrong_size_does_not():
-    with pytest.raises(DriverEndedError):
-        Session().send(READY, stamp_error=-500_000, control_mode_expected=2)
-    assert Session().send(READY, stamp_error=-500_000, num_joint_position=6).mode_now == MOVE
+    assert Session().send(READY, stamp_error=-500_000, control_mode_expected=2).driver.end is not None
+    assert Session().send(READY, stamp_error=-500_000, num_joint_position=6).follows
 
 
-@pytest.mark.parametrize("event", ["reflex", "stop"])
-def test_after_a_stop_only_the_operators_word_brings_the_arm_back(event):
-    path, session = swing(1.0, 0.35), Session()
+def in_motion(mode="position", **config):
+    """A session in the middle of a swing, with 0.66 rad/s."""
+    path, session = swing(1.0, 0.35), Session(mode, **config)
     for k in range(100):
-        session.send(path(0.005 * k))
-    if event == "reflex":
-        session.driver.enter_reflex("asked for")
-    else:
-        session.driver.user_stop()
-    speeds = [session.wait(1).driver.v_d for _ in range(300)]
-    assert (np.abs(np.diff(speeds, axis=0)) <= PANDA_LIMITS.acceleration * 1e-3 + 1e-12).all()
-    stopped = session.driver.q_d
-    session.send(path(0.5)).send(path(0.51))
-    assert session.mode_now == (REFLEX if event == "reflex" else USER_STOPPED)
-    np.testing.assert_array_equal(session.driver.q_d, stopped)
-    session.driver.restart()
-    assert session.send(stopped).send(stopped).mode_now == MOVE
+        values = path(0.005 * k) if mode == "position" else (path(0.005 * k + 0.005) - path(0.005 * k)) / 0.005
+        session.send(values)
+    assert np.abs(session.robot.v_d).max() > 0.6
+    return session
 
 
-def test_status_only_listens_to_nothing():
-    session = Session("position")
-    session.driver = PandaDriver(PandaDriverConfig(control_mode="status_only"), READY)
-    assert session.send(READY + 1, control_mode_expected=7).mode_now == IDLE
-    np.testing.assert_array_equal(session.driver.q_d, READY)
+def reflex(session):
+    session.robot.enter_reflex("cartesian_reflex")
+
+
+def stop(session):
+    session.robot.user_stop()
+
+
+def kill(session):
+    session.driver.kill()
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize(
+    ("event", "code", "left_in"), [(reflex, ENDED, IDLE), (stop, ABORTED, USER_STOPPED), (kill, KILLED, REFLEX)]
+)
+def test_the_driver_never_lives_to_tell_of_a_stop_and_the_arm_brakes_within_its_limits(
+    mode, event, code, left_in
+):
+    session = in_motion(mode)
+    event(session)
+    motion, told = [], []
+    for _ in range(300):
+        motion.append((session.wait(1).robot.v_d, session.robot.a_d))
+        told += [session.robot.mode] if session.driver.is_connected else []
+    v, a = np.moveaxis(motion, 1, 0)
+    assert (session.driver.end.code, session.robot.mode, set(told) - {MOVE}) == (code, left_in, set())
+    limits = PANDA_LIMITS
+    assert (np.abs(a) <= limits.acceleration).all()
+    assert (np.abs(np.diff(a, axis=0)) <= 1e-3 * limits.jerk + 1e-9).all()
+    # 0.66 rad/s at 7.5 rad/s^2 in the shoulder, which takes 2 ms to get there.
+    assert np.flatnonzero(np.abs(v).max(axis=1) > 1e-6)[-1] == pytest.approx(90, abs=6)
+
+
+@pytest.mark.parametrize("event", [reflex, stop, kill])
+def test_a_dead_driver_neither_hears_nor_comes_back_by_itself(event):
+    session = in_motion()
+    event(session)
+    session.wait(5000)
+    stopped = session.robot.q_d
+    for _ in range(100):
+        session.send(stopped + 0.1)
+    assert not session.driver.is_connected
+    np.testing.assert_array_equal(session.robot.q_d, stopped)
+
+
+def test_a_driver_that_is_started_connects_for_a_while_and_then_holds_the_arm_where_it_is():
+    session = in_motion()
+    reflex(session)
+    session.wait(500)
+    session.robot.guide(session.robot.q_d + 0.3 * SHOULDER)
+    session.wait(3000)
+    assert session.driver.start(session.now)
+    assert not session.driver.start(session.now)
+    session.wait(999)
+    assert (session.driver.is_connected, session.robot.mode) == (False, IDLE)
+    there = session.wait(1).robot.q_d
+    assert (session.driver.is_connected, session.robot.mode) == (True, MOVE)
+    np.testing.assert_array_equal(session.wait(1000).robot.q_d, there)
+    assert session.send(there).send(there).follows
+
+
+def test_a_driver_that_is_started_while_the_robot_is_stopped_ends_again():
+    session = in_motion()
+    kill(session)
+    assert session.wait(300).start().is_reflex  # it has told the robot to recover: the next one stays
+    assert session.start().follows
+    stop(session)
+    assert session.wait(300).start().driver.end.code == ABORTED
+    session.robot.recover()
+    assert session.start().follows
+
+
+def test_a_driver_that_is_killed_while_it_connects_is_gone():
+    session = in_motion()
+    reflex(session)
+    session.wait(300).driver.start(session.now)
+    kill(session.wait(500))
+    assert session.wait(1000).driver.end.code == KILLED
+    assert session.robot.mode == IDLE
+
+
+def test_a_person_leads_the_arm_slowly_to_where_it_is_wanted_and_nobody_takes_it_from_a_driver():
+    session = in_motion()
+    with pytest.raises(ValueError, match="controlled"):
+        session.robot.guide(READY)
+    stop(session)
+    goal = session.wait(500).robot.q_d + 0.3 * WRIST
+    session.robot.guide(goal)
+    speeds = [session.wait(1).robot.v_d for _ in range(500)]
+    assert session.robot.mode == GUIDING
+    assert np.abs(speeds).max() == pytest.approx(HAND_SPEED, rel=1e-3)
+    session.wait(2500)
+    assert session.robot.mode == USER_STOPPED
+    np.testing.assert_allclose(session.robot.q_d, goal, atol=2e-4)
+    with pytest.raises(ValueError, match="cannot go there"):
+        session.robot.guide(READY + 9)
+
+
+def test_a_driver_that_survives_stops_tells_of_them_and_goes_on_when_the_robot_has_recovered():
+    for event, mode in ((reflex, REFLEX), (stop, USER_STOPPED)):
+        session = in_motion(survives_stops=True)
+        event(session)
+        session.wait(300)
+        assert (session.driver.is_connected, session.robot.mode) == (True, mode)
+        stopped = session.robot.q_d
+        session.send(stopped)
+        session.robot.recover()
+        session.wait(10)
+        assert session.send(stopped).send(stopped).follows
+        np.testing.assert_array_equal(session.robot.q_d, stopped)
+
+
+def test_a_driver_of_status_only_listens_to_nothing_and_tells_of_everything():
+    session = Session("status_only")
+    session.driver.receive(command("position", READY + 1, session.now, control_mode_expected=7))
+    assert session.wait(10).robot.mode == IDLE
+    for event, mode in ((reflex, REFLEX), (stop, USER_STOPPED)):
+        event(session)
+        assert (session.wait(10).driver.is_connected, session.robot.mode) == (True, mode)
+        session.robot.recover()
+    session.robot.guide(READY + 0.1)
+    assert session.wait(10).robot.mode == GUIDING
+    assert session.wait(2000).robot.mode == IDLE
+    np.testing.assert_allclose(session.robot.q_d, READY + 0.1, atol=2e-4)
