@@ -65,7 +65,8 @@ def command_line() -> argparse.ArgumentParser:
     evaluate.add_argument(
         "--suite",
         choices=("films",),
-        help="instead of these scenes: films by a camera that moves, where nothing else does",
+        metavar="NAME",
+        help="films: instead of scenes, ten films of things that stand still, by a camera that moves and errs",
     )
     evaluate.add_argument(
         "--recordings", type=Path, metavar="DIR", help="with --suite films: also segment the recordings in DIR"

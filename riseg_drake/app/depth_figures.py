@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -93,7 +93,7 @@ def draw_depth(recordings: Sequence[Path], file: Path) -> None:
     """One frame of each recording, colour above depth, side by side, 320 pixels wide."""
     columns = []
     for recording in recordings:
-        frame = _frames(recording)[0]
+        (frame,) = _frames(recording, 1)
         z = frame.depth
         near, far = (float(np.quantile(z[z > 0], q)) for q in (0.02, 0.9)) if (z > 0).any() else (0.0, 1.0)
         level = np.clip(255 * (far - z) / max(far - near, 1e-6), 0, 255).astype(np.uint8)
@@ -104,7 +104,7 @@ def draw_depth(recordings: Sequence[Path], file: Path) -> None:
     write_png(file, np.hstack(columns))
 
 
-def _frames(recording: Path) -> list[Frame]:
+def _frames(recording: Path, most: int | None = None) -> list[Frame]:
     reader = RecordingReader(recording)
     return [
         Frame(
@@ -116,7 +116,7 @@ def _frames(recording: Path) -> list[Frame]:
             np.eye(4) if frame.X_WC is None else frame.X_WC,
             np.zeros(frame.depth.shape, bool) if frame.robot is None else frame.robot,
         )
-        for number, frame in enumerate(reader)
+        for number, frame in enumerate(islice(reader, most))
     ]
 
 

@@ -8,7 +8,7 @@ import json
 from collections.abc import Callable, Iterable, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 from rich.console import Console
@@ -99,7 +99,7 @@ def segment_film(
     (work / "mask").mkdir(parents=True, exist_ok=True)
     most, worst = -1, None
     for number, frame in enumerate(_told(reader, len(reader), f"segment {work.name}", console)):
-        start = perf_counter()
+        start = process_time()
         try:
             mask = replay.mask_after(frame)
         except NoPlaneError as error:
@@ -107,7 +107,7 @@ def segment_film(
             scores.without_table += 1
             continue
         before = scores.false_pixels
-        scores.add(number, mask, frame.robot, perf_counter() - start)
+        scores.add(number, mask, frame.robot, process_time() - start)
         write_png(work / "mask" / f"{number:06d}.png", mask)
         if scores.false_pixels - before > most:
             most, worst = scores.false_pixels - before, draw_masks(frame.color, mask)

@@ -39,7 +39,7 @@ class FilmScores:
     false_pixels: int = 0
     """Pixels of these, summed over all frames."""
     seconds: list[float] = field(default_factory=list)
-    """Work on each frame, s."""
+    """Work of one core on each frame, s."""
     of_thing: dict[str, ThingScores] = field(default_factory=dict)
 
     def add(

@@ -38,8 +38,9 @@ class StillFilmParameters:
     distance: float = 0.55
     """m from the middle of the scene."""
     steepest: float = 80.0
+    """degrees; the camera looks down at an angle of at most that,"""
     flattest: float = 40.0
-    """degrees; the camera looks down at an angle between these, drawn for each film."""
+    """degrees; and at least that, drawn for each film."""
     sway: float = 0.04
     """m by which the hand sways to each side, in a second or two."""
     turn: float = 0.02
@@ -92,7 +93,7 @@ def still_film(parameters: StillFilmParameters, seed: int) -> Iterator[RecordedF
 def hand_path(
     parameters: StillFilmParameters, middle: NDArray[np.float64], rng: np.random.Generator
 ) -> Iterator[RigidTransform]:
-    """Poses X_WC of a camera in a hand that looks at a point, from left or right, away from the arm."""
+    """Poses X_WC of a camera in a hand that looks at a point [3], from left or right, away from the arm."""
     elevation = np.radians(rng.uniform(parameters.flattest, parameters.steepest))
     azimuth = rng.choice([-1, 1]) * np.radians(rng.uniform(90, 125))
     away = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
