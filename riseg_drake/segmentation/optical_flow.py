@@ -25,9 +25,12 @@ DIS_PRESETS = {
 NO_FLOW = np.zeros((0, 0, 2), np.float32)
 """The flow of no pixels: E_t and O_t before the first pair."""
 
-_MARGIN = 0.03
-"""Share of the image's width by which flow is worked out around what stands on the table, and what the pair
-spans: objects' own motion from one camera frame to the next, and what a window covers."""
+_MARGIN, _MARGIN_FAR = 0.03, 0.0625
+"""Share of the image's width by which flow is worked out around what stands on the table: objects' own motion
+from one frame of a pair to the other, and what a window covers. The second where a pair spans far: as long as
+such a reference stays, and once more."""
+_FAR = 0.0125
+"""Share of the image's width that a pair spans from which on it spans far."""
 
 
 class FlowMethod(Protocol):
@@ -54,7 +57,8 @@ def flow_around(above_0: AboveTable, pair: FramePair, method: FlowMethod) -> NDA
     flow = np.full((height, width, 2), np.nan, np.float32)
     if not above_0.mask.any():
         return flow
-    rows, columns = bounding_region(above_0.mask, margin=round(_MARGIN * width + pair.span))
+    margin = _MARGIN if pair.span < _FAR * width else _MARGIN_FAR
+    rows, columns = bounding_region(above_0.mask, margin=round(margin * width))
     u, v = 0.5 * (columns.start + columns.stop), 0.5 * (rows.start + rows.stop)
     M = pixel_projection(pair.X_C1C0, pair.reference.intrinsics)
     a, b, c = M @ np.array([u, v, 1.0, 1 / above_0.distance])

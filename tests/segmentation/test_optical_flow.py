@@ -66,7 +66,7 @@ def test_flow_around_objects_follows_a_camera_that_moves_far(x: float) -> None:
     assert np.nanmedian(np.linalg.norm(flow - expected, axis=-1)[known]) < 0.3
 
 
-@pytest.mark.parametrize("millimetres", [8, 16, 24, 32])
+@pytest.mark.parametrize("millimetres", [8, 16, 24])
 def test_flow_follows_what_has_moved_as_far_as_the_pair_spans(millimetres: int) -> None:
     scene, here = DrawnScene([(0.07, 0.06, 0.03), (0.06, 0.08, 0.05)]), looking_down()
     before = [planar(-0.08, 0.02, 0.3), planar(0.05, 0.02)]
