@@ -62,6 +62,15 @@ def command_line() -> argparse.ArgumentParser:
     evaluate.add_argument(
         "--output", type=Path, metavar="DIR", help="output folder (out/evaluate_SCENARIO_seed_S)"
     )
+    evaluate.add_argument(
+        "--suite",
+        choices=("films",),
+        metavar="NAME",
+        help="films: instead of scenes, ten films of things that stand still, by a camera that moves and errs",
+    )
+    evaluate.add_argument(
+        "--recordings", type=Path, metavar="DIR", help="with --suite films: also segment the recordings in DIR"
+    )
     evaluate.add_argument("--scenario", type=Path, metavar="FILE", help="a YAML file (the built-in simulation)")
     evaluate.add_argument("--dask", metavar="ADDRESS", help="hand the scenes to a running Dask cluster")
     evaluate.add_argument(

@@ -54,6 +54,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.app.scenario_file import ScenarioError
     from riseg_drake.app.scene_pool import ClusterError
     from riseg_drake.evaluation.label_folders import LabelFolderError
+    from riseg_drake.evaluation.true_things import ThingsError
     from riseg_drake.learned.model_error import ModelError
     from riseg_drake.recording.layout import RecordingError
     from riseg_drake.robot.own_robot import OwnRobotError
@@ -69,6 +70,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
         ScenarioError,
         SceneError,
         LabelFolderError,
+        ThingsError,
         RecordingError,
         OwnRobotError,
         EvaluationError,

@@ -18,6 +18,10 @@ def run(chosen: argparse.Namespace, console: Console) -> None:
 
 def evaluate(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg evaluate`."""
+    if chosen.suite == "films":
+        from riseg_drake.app.films import films_command
+
+        return films_command(chosen.seed, chosen.recordings, chosen.output, chosen.scenario, console)
     from riseg_drake.app.evaluate import evaluate_command
 
     evaluate_command(

@@ -86,6 +86,9 @@ class FramePair(Immutable):
     current: Frame
     residual: float = 0.0
     """Standard deviation of O_t - E_t where nothing moves, pixels, as far as it was measured."""
+    span: float = 0.0
+    """Effective flow that the reference and the frame before `current` turned out to span, pixels: so far
+    had things moved."""
 
     @property
     def X_C1C0(self) -> NDArray[np.float64]:

@@ -14,6 +14,7 @@ from riseg_drake.segmentation.body_frames import (
     sample_body_frames,
 )
 from riseg_drake.segmentation.effective_flow import MovingParameters, effective_flow, moving_pixels
+from riseg_drake.segmentation.explained import explained_share
 from riseg_drake.segmentation.grouping import GroupingParameters, group_twists
 from riseg_drake.segmentation.motions import (
     BFIFGroups,
@@ -41,6 +42,9 @@ class BFIFParameters:
     frames: BodyFrameParameters = field(default_factory=BodyFrameParameters)
     grouping: GroupingParameters = field(default_factory=GroupingParameters)
     motions: MotionParameters = field(default_factory=MotionParameters)
+    explained_min: float = 0.25
+    """Of what has moved, the share that the groups' motions must explain in the images; where they do not, flow
+    was lost."""
 
 
 def group_body_frames(
@@ -52,6 +56,8 @@ def group_body_frames(
     rng: np.random.Generator,
 ) -> BFIFGroups:
     """G_t: body frames on what moves, grouped by their spatial twists, with each group's motion.
+
+    None, and an infinite span, where the motions that are found explain nothing.
 
     Args:
         pair: the frames of t-1 and t.
@@ -85,6 +91,9 @@ def group_body_frames(
     joined = merge_equal_motions(frames, group, motions, focal_length, parameters.motions)
     if not np.array_equal(joined, group):
         group, motions = joined, group_motions(frames, joined, precision, prior)
+    pixels_min = parameters.moving.area_min * above_0.pixels_per_metre(pair.reference.intrinsics) ** 2
+    if len(motions) and explained_share(pair, motions, above_0, pixels_min, noise) < parameters.explained_min:
+        return no_groups(flow_span=np.inf)
     seeds = frames.p_C0Q0[:, 0]
     spans = [flow_difference(seeds[group == g], X, np.eye(4), focal_length) for g, X in enumerate(motions)]
     flow_span = max(spans) if spans else _median_length(optical_flow, expected_flow, moving)

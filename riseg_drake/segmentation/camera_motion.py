@@ -6,6 +6,10 @@ The table tells: seen from two poses it must be the same plane. By how much it i
 frames, is what the poses are worth. Where that is more than a fraction of a pixel, the motion between two
 frames is set right by what does not move, as far as poses may err, and what then still differs between
 expected and observed flow is the noise above which something moves.
+
+A table tells less than it seems to where depth errs smoothly and differently from each view: it tilts by a
+degree between two frames of a camera that stands still. So the images have the last word: a correction that
+leaves more between expected and observed flow than there was before is none.
 """
 
 from dataclasses import dataclass, replace
@@ -140,13 +144,21 @@ def settled_pair(
         return pair
     # The error of both poses enters, as it does between consecutive frames.
     change = table_change(pair.reference, above_0.plane_W, pair.current, above_1.plane_W)
-    V = _fit(p_C0Q, uv_1, residual_sigma, pair, change, (sigma_R, sigma_p), parameters)
-    X_C1C0 = exp_se3(V) @ pair.X_C1C0
-    apart = uv_1 - project(move_points(X_C1C0, p_C0Q), intrinsics)
-    judges = on_table if np.count_nonzero(on_table) >= 200 else np.ones(len(apart), bool)
-    residual = float(1.4826 * np.median(np.abs(apart[judges])))
-    current = replace(pair.current, X_WC=pair.reference.X_WC @ inverse(X_C1C0))
-    return FramePair(pair.reference, current, residual)
+    same_plane = np.linalg.norm(change[0]) < parameters.tilt_max and abs(change[1]) < parameters.height_max
+    judges = on_table if np.count_nonzero(on_table) >= 200 else np.ones(len(p_C0Q), bool)
+
+    def residual(X_C1C0: NDArray) -> float:
+        apart = uv_1[judges] - project(move_points(X_C1C0, p_C0Q[judges]), intrinsics)
+        return float(1.4826 * np.median(np.abs(apart)))
+
+    as_given = residual(pair.X_C1C0)
+    for believed in (change, None) if same_plane else (None,):
+        V = _fit(p_C0Q, uv_1, residual_sigma, pair, believed, (sigma_R, sigma_p), parameters)
+        X_C1C0 = exp_se3(V) @ pair.X_C1C0
+        if (now := residual(X_C1C0)) < as_given:
+            current = replace(pair.current, X_WC=pair.reference.X_WC @ inverse(X_C1C0))
+            return replace(pair, current=current, residual=now)
+    return replace(pair, residual=as_given)
 
 
 def _points(
@@ -176,16 +188,16 @@ def _fit(
     uv_1: NDArray,
     flow_noise: NDArray,
     pair: FramePair,
-    change: tuple[NDArray, float, NDArray, NDArray],
+    change: tuple[NDArray, float, NDArray, NDArray] | None,
     sigma: tuple[float, float],
     parameters: CameraMotionParameters,
 ) -> NDArray[np.float64]:
-    """The small motion [6] of C1 by which most points, and the table, agree with the images."""
-    tilt, height, p_C1T, plane_C1 = change
+    """The small motion [6] of C1 by which most points, and the table if believed, agree with the images."""
     sigma_V = np.repeat(np.maximum(sigma, (1e-5, 1e-5)), 3)
     normal_0 = np.diag(sigma_V**-2.0)
     rhs_0 = np.zeros(6)
-    if np.linalg.norm(tilt) < parameters.tilt_max and abs(height) < parameters.height_max:
+    if change is not None:
+        tilt, height, p_C1T, plane_C1 = change
         n = plane_C1[:3]
         across = np.hstack([np.eye(3) - np.outer(n, n), np.zeros((3, 3))]) / _PLANE_TILT_SIGMA
         along = np.hstack([np.cross(p_C1T, n), n]) / _PLANE_HEIGHT_SIGMA

@@ -55,7 +55,7 @@ def next_pair(pair: FramePair, frame: Frame, flow_span: float, parameters: Frame
         renew = frame.time - pair.reference.time > parameters.age_still
         share = parameters.camera_span_still
     renew |= camera_span(pair.reference, frame) > share * frame.intrinsics.width
-    return FramePair(pair.current if renew else pair.reference, frame)
+    return FramePair(pair.current, frame) if renew else FramePair(pair.reference, frame, span=flow_span)
 
 
 def camera_span(reference: Frame, current: Frame) -> float:

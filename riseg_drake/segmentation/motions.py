@@ -56,7 +56,8 @@ class BFIFGroups(Immutable):
     """[K, 3], the seeds' points at t-1, m."""
     flow_span: float
     """Effective flow of the fastest group (root mean square over its frames), pixels. Where there is no
-    group, the median over what moves, which a body without texture does too; 0 if nothing moves."""
+    group, the median over what moves, which a body without texture does too; 0 if nothing moves; infinite
+    where flow was lost, so that the reference is renewed."""
 
     def __len__(self) -> int:
         """The number of groups G."""

@@ -25,9 +25,12 @@ DIS_PRESETS = {
 NO_FLOW = np.zeros((0, 0, 2), np.float32)
 """The flow of no pixels: E_t and O_t before the first pair."""
 
-_MARGIN = 0.03
-"""Share of the image's width by which flow is worked out around what stands on the table: objects' own
-motion from one frame of a pair to the other, and what a window covers."""
+_MARGIN, _MARGIN_FAR = 0.03, 0.0625
+"""Share of the image's width by which flow is worked out around what stands on the table: objects' own motion
+from one frame of a pair to the other, and what a window covers. The second where a pair spans far: as long as
+such a reference stays, and once more."""
+_FAR = 0.0125
+"""Share of the image's width that a pair spans from which on it spans far."""
 
 
 class FlowMethod(Protocol):
@@ -42,7 +45,8 @@ def flow_around(above_0: AboveTable, pair: FramePair, method: FlowMethod) -> NDA
     """O_t [H, W, 2], pixels, where it is needed: in and around what stands on the table, NaN elsewhere.
 
     The method sees a part of each image: that of t lies where the camera's motion has moved that of
-    t-1, to the whole pixel.
+    t-1, to the whole pixel. What has moved must still be in it: what leaves the part has no flow, and what is
+    made up in its place spans little, so that nothing would renew the reference.
 
     Args:
         above_0: what stands on the table, at t-1.
@@ -53,7 +57,8 @@ def flow_around(above_0: AboveTable, pair: FramePair, method: FlowMethod) -> NDA
     flow = np.full((height, width, 2), np.nan, np.float32)
     if not above_0.mask.any():
         return flow
-    rows, columns = bounding_region(above_0.mask, margin=round(_MARGIN * width))
+    margin = _MARGIN if pair.span < _FAR * width else _MARGIN_FAR
+    rows, columns = bounding_region(above_0.mask, margin=round(margin * width))
     u, v = 0.5 * (columns.start + columns.stop), 0.5 * (rows.start + rows.stop)
     M = pixel_projection(pair.X_C1C0, pair.reference.intrinsics)
     a, b, c = M @ np.array([u, v, 1.0, 1 / above_0.distance])

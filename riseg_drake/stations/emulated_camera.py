@@ -72,6 +72,8 @@ class EmulatedCamera:
             self._sensor.depth_image_32F_output_port().Eval(self._context).data[..., 0],
             self._camera,
             np.random.default_rng([self._seed, number]),
+            self._sensor.body_pose_in_world_output_port().Eval(self._context).GetAsMatrix4(),
+            self._seed,
         )
         return Picture(color, depth, seen_beside(depth, self._camera))
 

@@ -35,6 +35,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import Demultiplexer, StateInterpolatorWithDiscreteDerivative
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
 
+from riseg_drake.geometry.se3 import exp_se3
 from riseg_drake.robot.description import (
     JOINT_NAMES,
     PandaDescription,
@@ -149,8 +150,12 @@ def add_world(
 
 
 def ideal_camera(plant: MultibodyPlant, frame: Frame, config: CameraConfig) -> RgbdSensor:
-    """A camera at a frame of a plant that sees without noise; it needs the renderer RENDERER."""
+    """A camera at a frame of a plant that sees without noise; it needs the renderer RENDERER.
+
+    It is mounted as wrongly as the config says.
+    """
     k = config
+    X_CM = exp_se3(np.concatenate([k.mount_turn, k.mount_shift]))
     core = RenderCameraCore(
         RENDERER,
         CameraInfo(k.width, k.height, k.fx, k.fy, k.cx, k.cy),
@@ -159,7 +164,7 @@ def ideal_camera(plant: MultibodyPlant, frame: Frame, config: CameraConfig) -> R
     )
     return RgbdSensor(
         plant.GetBodyFrameIdOrThrow(frame.body().index()),
-        frame.GetFixedPoseInBodyFrame(),
+        frame.GetFixedPoseInBodyFrame() @ RigidTransform(X_CM),
         ColorRenderCamera(core),
         DepthRenderCamera(core, DepthRange(*CLIPPING)),
     )
@@ -228,6 +233,7 @@ class SimulatedStation(Diagram):
         builder.Connect(self.scene_graph.get_query_output_port(), sensor.query_object_input_port())
         builder.Connect(sensor.color_image_output_port(), camera.GetInputPort("color_image"))
         builder.Connect(sensor.depth_image_32F_output_port(), camera.GetInputPort("depth_image"))
+        builder.Connect(sensor.body_pose_in_world_output_port(), camera.GetInputPort("camera_pose"))
         builder.Connect(sensor.label_image_output_port(), labels.get_input_port())
         for name in ("color_image", "depth_image", "image_time"):
             builder.ExportOutput(camera.GetOutputPort(name), f"wrist.{name}")

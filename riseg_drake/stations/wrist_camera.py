@@ -5,12 +5,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.common.value import AbstractValue, Value
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, LeafSystem, State
 from pydrake.systems.sensors import ImageDepth32F, ImageLabel16I, ImageRgba8U
 
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import sanitize_depth
-from riseg_drake.stations.sensor_noise import SensorNoise, noisy_color, noisy_depth
+from riseg_drake.stations.sensor_noise import SensorNoise, Sight, noisy_color, noisy_depth
 
 
 @dataclass
@@ -36,6 +37,11 @@ class CameraConfig:
     depth_max: float = field(default=3.0, metadata={"least": 0.0, "most": 20.0})
     """Farthest depth that is measured, m."""
     noise: SensorNoise = field(default_factory=SensorNoise)
+    mount_turn: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    """Rotation vector in C, rad, by which the camera really is turned on the arm: what a hand-eye calibration
+    has wrong, a few milliradians at best,"""
+    mount_shift: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    """and by which it is shifted, m: a millimetre or two at best."""
 
     def check(self) -> None:
         """Raise ValueError for a camera that cannot be."""
@@ -57,11 +63,20 @@ def check_camera(cx: float, cy: float, width: int, height: int, depth_min: float
 
 
 def measured_images(
-    color: NDArray[np.uint8], depth: NDArray, config: CameraConfig, rng: np.random.Generator
+    color: NDArray[np.uint8],
+    depth: NDArray,
+    config: CameraConfig,
+    rng: np.random.Generator,
+    X_WC: NDArray[np.float64],
+    seed: int,
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-    """What the sensor makes of true colour [H, W, 3] and depth [H, W], m: with noise, and 0 = invalid."""
+    """What the sensor makes of true colour [H, W, 3] and depth [H, W], m: with noise, and 0 = invalid.
+
+    `rng` draws the noise of this picture; the camera's pose X_WC [4, 4] and the seed how depth errs from there.
+    """
     seen = noisy_color(np.ascontiguousarray(color), config.noise, rng)
-    measured = noisy_depth(sanitize_depth(depth), config.noise, rng)
+    sight = Sight(color, config.intrinsics, X_WC, seed)
+    measured = noisy_depth(sanitize_depth(depth), config.noise, rng, sight)
     within = (measured >= config.depth_min) & (measured <= config.depth_max)
     return seen, measured * within
 
@@ -69,10 +84,11 @@ def measured_images(
 class WristCamera(LeafSystem):
     """Takes a noisy picture of what the ideal sensor at its inputs shows, and holds it.
 
-    Inputs `color_image` (ImageRgba8U) and `depth_image` (ImageDepth32F) are evaluated at the pictures'
-    times only: at the start, then every `period`, `delay` late. Outputs of the same names and
-    `image_time` (s) are always of one instant; before the first picture the images have no pixels and the
-    time is -1. The noise depends on the seed and on the number of the picture alone.
+    Inputs `color_image` (ImageRgba8U), `depth_image` (ImageDepth32F) and `camera_pose` (RigidTransform, of
+    the camera or of its body, in the world) are evaluated at the pictures' times only: at the start, then
+    every `period`, `delay` late. Outputs of the same names as the images and `image_time` (s) are always of
+    one instant; before the first picture the images have no pixels and the time is -1. The noise depends on
+    the seed, on the number of the picture and on the pose alone.
     """
 
     def __init__(self, config: CameraConfig, seed: int, period: float, delay: float):
@@ -82,6 +98,7 @@ class WristCamera(LeafSystem):
         size = (config.width, config.height)
         self._color_in = self.DeclareAbstractInputPort("color_image", Value(ImageRgba8U(*size)))
         self._depth_in = self.DeclareAbstractInputPort("depth_image", Value(ImageDepth32F(*size)))
+        self._pose_in = self.DeclareAbstractInputPort("camera_pose", Value(RigidTransform()))
         self._color = self.DeclareAbstractState(Value(ImageRgba8U()))
         self._depth = self.DeclareAbstractState(Value(ImageDepth32F()))
         # The time of the picture, and how many pictures were taken before it.
@@ -106,7 +123,12 @@ class WristCamera(LeafSystem):
         seen = self._color_in.Eval(context).data
         color.mutable_data[:] = seen
         color.mutable_data[..., :3], depth.mutable_data[..., 0] = measured_images(
-            seen[..., :3], self._depth_in.Eval(context).data[..., 0], self._config, rng
+            seen[..., :3],
+            self._depth_in.Eval(context).data[..., 0],
+            self._config,
+            rng,
+            self._pose_in.Eval(context).GetAsMatrix4(),
+            self._seed,
         )
         state.get_mutable_abstract_state(int(self._color)).set_value(color)
         state.get_mutable_abstract_state(int(self._depth)).set_value(depth)

@@ -46,9 +46,9 @@ def shortened(words: list[str]) -> list[str]:
 def one_scene(words: list[str]) -> list[str] | None:
     """`riseg evaluate` of one scene with no push, in this process, whose folder is the test's own.
 
-    None where it wants a Dask cluster, weights of a SAM, or masks of another method.
+    None where it wants a Dask cluster, weights of a SAM, masks of another method, or a suite of many scenes.
     """
-    if {"--dask", "--baseline", "--masks"} & set(words):
+    if {"--dask", "--baseline", "--masks", "--suite"} & set(words):
         return None
     given = dict(pairwise(words)).get("--scenario")
     short = [word for word in words if word not in ("--scenario", given)]

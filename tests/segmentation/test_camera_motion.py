@@ -72,6 +72,18 @@ def test_exact_poses_are_left_untouched() -> None:
     assert settled_pair(pair, flow, *above, PoseError(), MeasurementNoise(), PARAMETERS) is pair
 
 
+@pytest.mark.parametrize("table", [Blank(), Texture(9, contrast=10)], ids=["blank table", "textured table"])
+def test_a_table_that_tilts_with_the_depth_does_not_turn_the_camera(table) -> None:
+    """As depth that errs smoothly has it: another table in each frame, where the poses are right."""
+    pair, flow, above, X_true = pair_with_error(table, np.eye(4))
+    tilt = Rotation.from_rotvec([0.01, -0.008, 0]).as_matrix()
+    plane_W = np.append(tilt @ above[1].plane_W[:3], above[1].plane_W[3] + 0.004)
+    above[1] = replace(above[1], plane_W=plane_W)
+    settled = settled_pair(pair, flow, *above, ERRS, MeasurementNoise(), PARAMETERS)
+    assert pixels(settled.X_C1C0 @ inverse(X_true)) < 0.35
+    assert 0 < settled.residual < 0.3
+
+
 def test_the_motion_is_set_right_no_further_than_poses_may_err() -> None:
     far = np.eye(4)
     far[:3, 3] = [0.02, 0, 0]

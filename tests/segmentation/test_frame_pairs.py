@@ -53,6 +53,14 @@ def test_the_reference_stays_while_things_move_and_is_renewed_beyond_the_span() 
     assert references(frames, [0, 1, 4, 7, 11, 2, 4], flow_span_share=share) == [0, 0, 0, 0, 0, 4, 4]
 
 
+def test_a_pair_knows_how_far_things_had_moved_since_its_reference() -> None:
+    pair, spans = None, []
+    for newest, before in zip([frame(k) for k in range(6)], [0, 0, 3, 7, 11, 2], strict=True):
+        pair = next_pair(pair, newest, before, FramePairParameters(flow_span_share=10.0 / CAMERA.width))
+        spans.append(pair.span)
+    assert spans == [0, 0, 3, 7, 0, 2]
+
+
 def test_motion_keeps_an_old_reference_and_stillness_does_not() -> None:
     frames = [frame(k, rate=2.0) for k in range(7)]
     assert references(frames, [1.5] * 7, age_still=1.2) == [0] * 7

@@ -1,11 +1,22 @@
 """Dense inverse search against images that are shifted by a known amount."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from riseg_drake.segmentation.expected_flow import expected_flow
 from riseg_drake.segmentation.optical_flow import DIS_PRESETS, DisFlow, DisFlowParameters, flow_around
-from tests.segmentation.drawn_scene import CAMERA, DrawnScene, Texture, looking_down, planar, standing
+from tests.segmentation.drawn_scene import (
+    CAMERA,
+    DrawnScene,
+    Texture,
+    flow_of_bodies,
+    looking_down,
+    motion_seen_from,
+    planar,
+    standing,
+)
 
 HEIGHT, WIDTH = 120, 160
 INTERIOR = (slice(16, -16), slice(16, -16))
@@ -53,6 +64,22 @@ def test_flow_around_objects_follows_a_camera_that_moves_far(x: float) -> None:
     expected = expected_flow(pair.reference.depth, pair.X_C1C0, CAMERA)
     assert known.sum() > 0.9 * (label_0 > 0).sum()
     assert np.nanmedian(np.linalg.norm(flow - expected, axis=-1)[known]) < 0.3
+
+
+@pytest.mark.parametrize("millimetres", [8, 16, 24])
+def test_flow_follows_what_has_moved_as_far_as_the_pair_spans(millimetres: int) -> None:
+    scene, here = DrawnScene([(0.07, 0.06, 0.03), (0.06, 0.08, 0.05)]), looking_down()
+    before = [planar(-0.08, 0.02, 0.3), planar(0.05, 0.02)]
+    after = [before[0], planar(0.05 + 0.001 * millimetres, 0.02)]
+    pair, label_0, _ = scene.pair((here, here), (before, after))
+    moved = label_0 == 2
+    true = flow_of_bodies(pair, label_0, {2: motion_seen_from(here, before[1], after[1])})
+    span = float(np.median(np.linalg.norm(true[moved], axis=-1)))
+    # So far the frame before had come, of ten on the way.
+    pair = replace(pair, span=0.9 * span)
+    flow = flow_around(standing(pair.reference, label_0 > 0), pair, DisFlow())
+    away = np.linalg.norm(flow - true, axis=-1)[moved]
+    assert np.nanquantile(away, 0.8) < 0.5
 
 
 def test_there_is_no_flow_where_nothing_stands() -> None:

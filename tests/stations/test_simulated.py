@@ -5,6 +5,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
 from riseg_drake.geometry.camera import back_project
+from riseg_drake.geometry.se3 import exp_se3
 from riseg_drake.robot.kinematics import PandaKinematics, tip_pointing_down
 from riseg_drake.stations.contract import check_contract
 from riseg_drake.stations.object_models import measure
@@ -186,3 +187,20 @@ def test_settings_that_cannot_be_are_named(boxes, change, message):
     change(config)
     with pytest.raises(ValueError, match=message):
         SimulatedStation(config, objects=boxes)
+
+
+def test_a_camera_that_is_mounted_wrongly_looks_from_where_it_really_is(boxes):
+    config = SimulatedStationConfig()
+    config.camera.mount_turn, config.camera.mount_shift = [0.01, -0.02, 0.03], [0.004, 0.0, -0.002]
+    poses = []
+    for settings in (SimulatedStationConfig(), config):
+        run = Run(boxes, config=settings)
+        sensor = run.station.GetSubsystemByName("ideal_camera")
+        context = sensor.GetMyContextFromRoot(run.context)
+        poses.append(sensor.body_pose_in_world_output_port().Eval(context).GetAsMatrix4())
+    V = np.concatenate([config.camera.mount_turn, config.camera.mount_shift])
+    np.testing.assert_allclose(np.linalg.inv(poses[0]) @ poses[1], exp_se3(V), atol=1e-9)
+    # What kinematics say of the camera is what they would say of a right one.
+    np.testing.assert_allclose(
+        poses[0], PandaKinematics(config.panda).X_WC(np.array(start_position(config))), atol=1e-9
+    )
