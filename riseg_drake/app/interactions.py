@@ -14,6 +14,7 @@ from riseg_drake.app.output import Step
 from riseg_drake.evaluation.disturbance import Disturbance, motion_between, object_at
 from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.pushing.decision import UNDECIDED, Decision, Ending
 from riseg_drake.pushing.push import NO_PUSH, ArmPhase, Push
 from riseg_drake.systems.stage_clock import StageClock
 
@@ -60,7 +61,11 @@ class Progress:
     """Since the start, s."""
     frames: int = 0
     end: str = ""
-    """Why the run ended; empty while it goes on."""
+    """Why the run ended, in words; empty while it goes on."""
+    decision: Decision = UNDECIDED
+    """That to end; UNDECIDED while the run goes on, and where somebody else ended it."""
+    unsettled_area: float = float("nan")
+    """What was yet to be segmented at the last decision, m^2; NaN before the first."""
 
 
 def interactions(
@@ -75,8 +80,8 @@ def interactions(
 ) -> Iterator[Step]:
     """Run Alg. 1; yields how things stand before the first and after every interaction.
 
-    It ends when the arm is done (no push is left, a_i = null, or enough were made), or when `longest`
-    seconds have passed; `progress.end` says which. At wall time also when somebody else has set
+    It ends when the arm is done (a_i = null, or enough pushes were made), or when `longest` seconds have
+    passed; `progress.end` and `progress.decision` say which. At wall time also when somebody else has set
     `progress.end`; how things stand then is yielded, too. The truth is that of the simulation if not given.
     """
     clock.watch(wired.stages)
@@ -104,16 +109,29 @@ def interactions(
         if decided:
             yield book.close(wired.interaction_step(context))  # line 10
             progress.interaction_step += 1  # line 9
+        decision = wired.last_decision(context)
+        progress.unsettled_area = decision.unsettled_area
         if news.phase is ArmPhase.DONE:
-            made = wired.interaction_step(context)
-            enough = made >= wired.most_interactions
-            progress.end = (
-                f"{made} of {made} interactions were made" if enough else "no push is left that could find more"
-            )
+            progress.decision = decision
+            progress.end = _why(decision, wired.interaction_step(context), wired.most_interactions)
         elif progress.time >= longest:
-            progress.end = f"{longest:g} s were {'over' if wall else 'simulated'}"
+            progress.decision = Decision(ending=Ending.TIME, unsettled_area=decision.unsettled_area)
+            progress.end = _and(f"{longest:g} s were {'over' if wall else 'simulated'}", progress.decision.why)
         elif progress.end and wall and book.has_seen:
             yield book.close(wired.interaction_step(context))
+
+
+def _why(decision: Decision, made: int, most: int) -> str:
+    """Why the arm is done, in words."""
+    if decision.ending is None:
+        return "the operator ended it"
+    if decision.ending is Ending.ENOUGH_INTERACTIONS:
+        return _and(f"{made} of {most} interactions were made", decision.why)
+    return decision.why
+
+
+def _and(*parts: str) -> str:
+    return ", ".join(part for part in parts if part)
 
 
 def simulated_truth(wired: WiredDiagram) -> TruthSource:

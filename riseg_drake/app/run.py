@@ -7,6 +7,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 from pydrake.geometry import Meshcat, StartMeshcat
 from pydrake.systems.framework import Context
@@ -81,6 +82,19 @@ def run(
     return steps
 
 
+def ending_figures(progress: Progress) -> dict[str, Any]:
+    """How a run ended and what was left, as the summary has it; `ended` is null where somebody ended it."""
+    decision = progress.decision
+    figures: dict[str, Any] = {
+        "ended": decision.ending.value if decision.ending else None,
+        "unsettled_area_m2": round(progress.unsettled_area, 6),
+    }
+    if decision.failed:
+        figures["candidates"] = decision.candidates
+        figures["candidates_failed"] = {what.name.lower(): number for what, number in decision.failed.items()}
+    return figures
+
+
 def peak_memory_mb() -> int:
     """The most memory this process has held so far, MB."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024  # Linux counts in kB
@@ -133,6 +147,7 @@ def state_of(folder: RunFolder, progress: Progress, steps: list[Step]) -> Iterat
         folder.note(
             state=state,
             end=end,
+            **ending_figures(progress),
             seconds=round(perf_counter() - start, 2),
             simulated_s=round(progress.time, 3),
             frames=progress.frames,

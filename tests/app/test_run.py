@@ -35,9 +35,23 @@ def test_a_run_ends_by_itself_and_leaves_a_step_for_every_interaction(finished):
     assert content["state"] == "done"
     assert content["seed"] == 1
     assert [step["step"] for step in content["steps"]] == [0, 1]
+    assert content["ended"] == "enough_interactions"
     for i in (0, 1):
         names = {path.name for path in (finished / f"step_{i}").iterdir()}
         assert names == {"color.png", "depth.png", "mask.png", "overlay.png", "ground_truth.png"}
+
+
+def test_the_area_that_is_left_at_the_end_is_that_of_what_is_not_segmented(finished):
+    # Seen from straight above at 0.5 m: one of two toys, as the last step's pictures have it.
+    content = summary(finished)
+    depth, mask, truth = (
+        read(finished / "step_1" / f"{name}.png") for name in ("depth", "mask", "ground_truth")
+    )
+    left = (truth > 0) & (mask == 0)
+    area = np.sum((depth[left] / 1e3) ** 2) / (308.1 * 307.9)
+    assert area > 1e-3
+    assert content["unsettled_area_m2"] == pytest.approx(area, rel=0.2)
+    assert f"1 of 1 interactions were made, {1e4 * content['unsettled_area_m2']:.0f} cm^2" in content["end"]
 
 
 def test_before_the_first_push_the_mask_is_empty(finished):

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from riseg_drake.pushing.decision import PathStage
 from riseg_drake.pushing.find_action import find_action
-from riseg_drake.pushing.push import ArmPhase
-from riseg_drake.pushing.push_path import PushPathParameters, plan_push_path
+from riseg_drake.pushing.push import NO_PUSH, ArmPhase
+from riseg_drake.pushing.push_path import PushPath, PushPathParameters, plan_push_path
 from riseg_drake.pushing.pusher import Pusher
 from riseg_drake.robot.kinematics import observe_pose
 from riseg_drake.robot.limits import PANDA_LIMITS
@@ -23,8 +24,8 @@ def planned(drawn, panda, q_observe):
         drawn.map(),
         np.random.default_rng(0),
         plan_path=lambda push: plan_push_path(push, panda, q_observe, Pusher()),
-    )
-    assert push is not None
+    ).push
+    assert push is not NO_PUSH
     return push
 
 
@@ -118,11 +119,17 @@ def test_tip_rises_first_where_the_observation_posture_is_lower_than_things(push
 
 @pytest.mark.parametrize("x", [0.95, 0.05])
 def test_push_out_of_reach_has_no_path(push, panda, q_observe, x):
-    assert plan_push_path(replace(push, p_WE=np.array([x, 0.1, 0.008])), panda, q_observe, Pusher()) is None
+    assert (
+        plan_push_path(replace(push, p_WE=np.array([x, 0.1, 0.008])), panda, q_observe, Pusher())
+        is PathStage.POSTURE
+    )
 
 
 def test_things_as_tall_as_the_pusher_are_not_pushed(push, panda, q_observe):
-    assert plan_push_path(replace(push, tallest=0.27), panda, q_observe, Pusher()) is None
+    assert (
+        plan_push_path(replace(push, tallest=0.27), panda, q_observe, Pusher())
+        is PathStage.ROOM_BELOW_THE_FLANGE
+    )
 
 
 def test_reaches_pushes_all_over_the_work_area(drawn, panda, q_observe):
@@ -137,13 +144,13 @@ def test_reaches_pushes_all_over_the_work_area(drawn, panda, q_observe):
                 p_WE=np.append(p_W, 0.008),
                 direction_W=np.array([np.cos(angle), np.sin(angle)]),
             )
-            planned_count += plan_push_path(push, panda, q_observe, Pusher()) is not None
+            planned_count += isinstance(plan_push_path(push, panda, q_observe, Pusher()), PushPath)
     assert planned_count >= 26
 
 
-def test_path_that_takes_too_long_is_none(push, panda, q_observe):
+def test_path_that_takes_too_long_is_no_path(push, panda, q_observe):
     short = PushPathParameters(longest=push.path.duration - 0.1)
-    assert plan_push_path(push, panda, q_observe, Pusher(), short) is None
+    assert plan_push_path(push, panda, q_observe, Pusher(), short) is PathStage.DURATION
 
 
 def test_no_joint_leaps_between_samples(push):

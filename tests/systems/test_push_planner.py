@@ -8,6 +8,7 @@ from pydrake.common.value import Value
 
 from riseg_drake.geometry.camera import Intrinsics, rays
 from riseg_drake.geometry.rgbd import NO_PAIR, Frame, FramePair
+from riseg_drake.pushing.decision import UNDECIDED, Ending
 from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.pushing.tried_pushes import TriedPush
 from riseg_drake.robot.kinematics import PandaKinematics, observe_pose
@@ -57,14 +58,14 @@ def evaluate(panda, q_observe, pair, above, mask, tried=None, seed=0):
     planner.GetInputPort("position").FixValue(context, q_observe)
     if tried is not None:
         planner.GetInputPort("tried_pushes").FixValue(context, Value[object](tried))
-    return planner.GetOutputPort("push").Eval(context)
+    return planner.GetOutputPort("decision").Eval(context)
 
 
 NOTHING = np.zeros(CAMERA.shape, np.uint16)
 
 
 def test_push_goes_through_the_object_and_has_a_path_from_here_to_here(panda, q_observe, scene):
-    push = evaluate(panda, q_observe, *scene, NOTHING)
+    push = evaluate(panda, q_observe, *scene, NOTHING).push
     assert push.center_W == pytest.approx([0.5, 0.05], abs=0.002)
     assert push.path.position(0.0) == pytest.approx(q_observe)
     assert push.path.position(push.path.duration) == pytest.approx(q_observe)
@@ -74,22 +75,24 @@ def test_push_goes_through_the_object_and_has_a_path_from_here_to_here(panda, q_
 
 
 def test_segmented_scene_gives_null(panda, q_observe, scene):
-    assert evaluate(panda, q_observe, *scene, scene[1].mask.astype(np.uint16)) is NO_PUSH
+    decision = evaluate(panda, q_observe, *scene, scene[1].mask.astype(np.uint16))
+    assert decision.push is NO_PUSH
+    assert decision.ending is Ending.NOTHING_LEFT
 
 
-def test_before_the_first_frame_there_is_no_push(panda, q_observe, scene):
-    assert evaluate(panda, q_observe, NO_PAIR, scene[1], NOTHING) is NO_PUSH
+def test_before_the_first_frame_nothing_is_decided(panda, q_observe, scene):
+    assert evaluate(panda, q_observe, NO_PAIR, scene[1], NOTHING) is UNDECIDED
 
 
 def test_same_seed_and_frame_give_the_same_push(panda, q_observe, scene):
-    first, second = (evaluate(panda, q_observe, *scene, NOTHING, seed=5) for _ in range(2))
+    first, second = (evaluate(panda, q_observe, *scene, NOTHING, seed=5).push for _ in range(2))
     assert np.array_equal(first.p_WE, second.p_WE)
 
 
 def test_push_tried_in_vain_is_not_proposed_again(panda, q_observe, scene):
-    first = evaluate(panda, q_observe, *scene, NOTHING)
+    first = evaluate(panda, q_observe, *scene, NOTHING).push
     tried = (TriedPush(first.p_WB, first.direction_W, changed=False),)
-    second = evaluate(panda, q_observe, *scene, NOTHING, tried=tried)
+    second = evaluate(panda, q_observe, *scene, NOTHING, tried=tried).push
     assert first.direction_W @ second.direction_W < np.cos(0.5)
 
 
@@ -97,4 +100,4 @@ def test_ports_have_the_names_of_the_contract(panda):
     planner = PushPlanner(panda)
     names = [planner.get_input_port(i).get_name() for i in range(planner.num_input_ports())]
     assert names == ["pair", "above_table", "mask", "position", "tried_pushes"]
-    assert planner.get_output_port().get_name() == "push"
+    assert planner.get_output_port().get_name() == "decision"
