@@ -166,7 +166,11 @@ def make_diagram(
             drivers = drivers or Drivers(Reception(DrakeLcm("memq://"), config.lcm))
             station = HardwareStation(config, drivers.reception, drivers.sink, meshcat=meshcat)
             q_observe = observation_posture(
-                kinematics, config.centre_W, config.observe_height, config.start_position
+                kinematics,
+                config.centre_W,
+                config.observe_height,
+                config.start_position,
+                config.observe_pitch,
             )
     except (ValueError, RuntimeError) as error:
         raise ScenarioError(" ".join(str(error).split())) from error

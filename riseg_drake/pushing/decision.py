@@ -60,7 +60,7 @@ class Decision(Immutable):
     unsettled_area: float = float("nan")
     """objsToSegment, what is yet to be segmented, m^2 on the table; NaN before the first frame."""
     candidates: int = 0
-    """Without a valid push: the candidates there were; without a path: the valid pushes among them."""
+    """Without a valid push: the candidates there were; without a path: the valid pushes that were tried."""
     failed: Mapping[Criterion | PathStage, int] = field(default_factory=dict)
     """How many of these fail each criterion (one may fail several), or at which stage of the path."""
 

@@ -20,6 +20,11 @@ from riseg_drake.pushing.table_map import TableMap, TableMapParameters
 from riseg_drake.pushing.tried_pushes import TriedPush
 from riseg_drake.pushing.validity import ValidityParameters, is_valid_push
 
+ALIKE_DISTANCE = 0.010
+"""Where the arm has no path for a push, it is not asked about another that begins this close to it, m ..."""
+ALIKE_ANGLE = 0.2
+"""... and goes within this angle of its direction, rad."""
+
 PlanPath = Callable[[Push], PushPath | PathStage]
 """The arm's path for a push, or the stage of it that it cannot do."""
 
@@ -36,7 +41,7 @@ class FindActionParameters:
     pusher: Pusher = field(default_factory=Pusher)
     ranking: RankingParameters = field(default_factory=RankingParameters)
     paths: int = 30
-    """The arm's path is planned for at most this many candidates, the best, before finer clusters."""
+    """The arm's path is planned for at most this many candidates, the best that are not alike."""
 
 
 def find_action(
@@ -92,11 +97,12 @@ def find_action(
 
 
 class _PathSearch:
-    """The arm's path for the best push that has one; no push is tried twice."""
+    """The arm's path for the best push that has one."""
 
     def __init__(self, plan_path: PlanPath | None, most: int):
         self._plan_path, self._most = plan_path, most
-        self._known: set[bytes] = set()
+        self._places: list[NDArray] = []  # p_WE and direction of the pushes that have no path
+        self._directions: list[NDArray] = []
         self.failed: Counter[Criterion | PathStage] = Counter()
         """How many pushes failed at each stage."""
 
@@ -104,20 +110,25 @@ class _PathSearch:
         """The first of the pushes, best first, that the arm can do."""
         if self._plan_path is None:
             return pushes[0] if pushes else None
-        tries = 0
         for push in pushes:
-            key = np.append(push.p_WE, push.direction_W).tobytes()
-            if key in self._known:
-                continue
-            if tries == self._most:
+            if len(self._places) == self._most:
                 return None
-            tries += 1
-            self._known.add(key)
+            if self._is_like_one_that_failed(push):
+                continue
             path = self._plan_path(push)
             if not isinstance(path, PathStage):
                 return replace(push, path=path)
             self.failed[path] += 1
+            self._places.append(push.p_WE[:2])
+            self._directions.append(push.direction_W)
         return None
+
+    def _is_like_one_that_failed(self, push: Push) -> bool:
+        if not self._places:
+            return False
+        near = np.linalg.norm(np.array(self._places) - push.p_WE[:2], axis=1) < ALIKE_DISTANCE
+        alike = np.array(self._directions) @ push.direction_W > np.cos(ALIKE_ANGLE)
+        return bool(np.any(near & alike))
 
 
 def valid_pushes(

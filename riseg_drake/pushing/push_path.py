@@ -6,7 +6,7 @@ retraces the way there in joint space: it needs no planning, ends exactly where 
 through space that was found free.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +50,8 @@ class PushPathParameters:
     joint_step: float = 0.25
     """No joint may turn more than this between two of those poses, rad: beyond, it would be a leap."""
     min_clearance: float = MIN_CLEARANCE
-    """Room that arm, pusher and camera keep to the table and to each other, m."""
+    """Room that arm, pusher and camera keep to the table and to each other, m; half the tip's height where that
+    is less, so that low things can be pushed."""
 
 
 @dataclass(frozen=True)
@@ -104,13 +105,14 @@ def plan_push_path(
     X_WAbove = tip_pointing_down(np.append(push.p_WE[:2], crossing), yaw)
     X_WReached = tip_pointing_down(push.p_WE + push.length * ahead_W, yaw)
     # From the push outwards: the posture for it is chosen first, the rest has to lead there.
-    q_start = kinematics.solve_ik(X_WStart, q_observe, min_clearance=parameters.min_clearance)
+    low = replace(parameters, min_clearance=min(parameters.min_clearance, push.tip_height / 2))
+    q_start = kinematics.solve_ik(X_WStart, q_observe, min_clearance=low.min_clearance)
     if q_start is None:
         return PathStage.POSTURE
-    stroke = _trace(_between(X_WStart, X_WReached, 0.0, parameters), q_start, kinematics, parameters)
+    stroke = _trace(_between(X_WStart, X_WReached, 0.0, low), q_start, kinematics, low)
     if stroke is None:
         return PathStage.STROKE
-    climb = _trace(_between(X_WStart, X_WAbove, 0.0, parameters), q_start, kinematics, parameters)
+    climb = _trace(_between(X_WStart, X_WAbove, 0.0, low), q_start, kinematics, low)
     if climb is None:
         return PathStage.DESCENT
     legs = _crossing(q_observe, climb[-1], crossing, kinematics, parameters)

@@ -88,11 +88,13 @@ class HardwareStationConfig:
     lcm: LcmConfig = field(default_factory=LcmConfig)
     command: CommandParameters = field(default_factory=CommandParameters)
     centre_W: list[float] = field(default_factory=lambda: [0.5, 0.0])
-    """Middle of the work area on the table, x and y in W, m; the camera looks down at it between pushes."""
+    """Middle of the work area on the table, x and y in W, m; the camera looks at it between pushes."""
     observe_height: float = 0.5
-    """Height of the camera above it then, m."""
+    """Distance of the camera from it then, m: its height, where it looks straight down."""
+    observe_pitch: float = 0.0
+    """How far the view leans from straight down then, rad, from the side where the arm has most room."""
     start_position: list[float] = field(default_factory=list)
-    """Joint angles to look from instead, rad, 7; empty: as the two lines above say."""
+    """Joint angles to look from instead, rad, 7; empty: as the lines above say."""
 
 
 class TargetSink(Protocol):

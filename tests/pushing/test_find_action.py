@@ -168,8 +168,12 @@ def test_without_any_reachable_candidate_the_action_is_null_because_there_is_no_
     assert decision.failed == {PathStage.CROSSING: 1, PathStage.STROKE: len(asked) - 1}
     assert decision.candidates == len(asked)
     assert decision.fails_most is PathStage.STROKE
-    # Nobody is asked twice about the same push, whichever clustering it came from.
-    assert len({(*push.p_WE, *push.direction_W) for push in asked}) == len(asked)
+    # Nobody is asked again about as good as the same push, whichever clustering it came from.
+    assert 20 < len(asked) <= FindActionParameters().paths
+    for n, push in enumerate(asked):
+        for other in asked[:n]:
+            far = np.linalg.norm(push.p_WE[:2] - other.p_WE[:2]) >= 0.01
+            assert far or push.direction_W @ other.direction_W <= np.cos(0.2)
 
 
 def test_ring_is_pushed_though_its_center_is_empty(drawn):
