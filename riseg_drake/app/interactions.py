@@ -1,7 +1,8 @@
 """Alg. 1: the robot acts and segments, and every interaction leaves L*_t behind."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from pydrake.systems.framework import Context, EventStatus
 from riseg_drake.app.diagram import WiredDiagram
 from riseg_drake.app.output import Step
 from riseg_drake.evaluation.disturbance import Disturbance, motion_between, object_at
+from riseg_drake.evaluation.in_motion import in_motion, moved_objects, overlap_f_of
 from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pushing.decision import UNDECIDED, Decision, Ending
@@ -26,12 +28,17 @@ Listener = Callable[[Frame, Context], None]
 class Truth:
     """What somebody knows who may cheat, of the moment of one frame."""
 
-    labels: NDArray[np.uint16]
-    """The true visible object ids [H, W]."""
+    draw: Callable[[], NDArray[np.uint16]] = field(repr=False)
+    """Gives the true visible object ids [H, W]; drawing them takes as long as a picture."""
     poses: dict[str, NDArray[np.float64]]
     """The true poses X_WB [4, 4] of the objects, by name."""
     names: Mapping[int, str]
     """By object id."""
+
+    @cached_property
+    def labels(self) -> NDArray[np.uint16]:
+        """The true visible object ids [H, W]; must be asked for before the diagram goes on."""
+        return self.draw()
 
 
 TruthSource = Callable[[Frame, Context], Truth | None]
@@ -136,7 +143,11 @@ def _and(*parts: str) -> str:
 
 def simulated_truth(wired: WiredDiagram) -> TruthSource:
     """The truth that a simulated station knows."""
-    return lambda _, context: Truth(wired.true_labels(context), wired.true_poses(context), wired.object_names)
+
+    def truth(_: Frame, context: Context) -> Truth:
+        return Truth(lambda: wired.true_labels(context), wired.true_poses(context), wired.object_names)
+
+    return truth
 
 
 class _Seen(NamedTuple):
@@ -184,6 +195,8 @@ class _Book:
         self._before: dict[str, NDArray] = {}  # and before the one that is under way,
         self._pushed: str | None = None  # and what that one pushes
         self._seen: _Seen | None = None
+        self._overlap_f: list[float] = []  # of the moved objects in each frame since then
+        self._moved: set[int] = set()
 
     @property
     def has_seen(self) -> bool:
@@ -191,13 +204,24 @@ class _Book:
         return self._seen is not None
 
     def count(self, frame: Frame, is_at_rest: bool) -> None:
-        """Take note of a frame; of one at rest also of the truth of the same moment."""
+        """Take note of a frame, and of the truth of the same moment where it counts."""
         self._frames += 1
-        if not is_at_rest:
-            return
         truth = self._truth(frame, self._context)
+        if not is_at_rest:
+            if truth is not None:
+                self._count_moved(truth)
+            return
+        if truth is not None:
+            _ = truth.labels
         if truth is not None or self._seen is None or self._seen.truth is None:
             self._seen = _Seen(frame, self._wired.mask(self._context), truth)
+
+    def _count_moved(self, truth: Truth) -> None:
+        """Score what has moved in this interaction. Labels are drawn only where there is such a thing."""
+        moved = moved_objects(self._before, truth.poses, truth.names)
+        if moved:
+            self._moved |= moved
+            self._overlap_f.append(overlap_f_of(moved, self._wired.mask(self._context), truth.labels))
 
     def close(self, interaction_step: int) -> Step:
         """The step that ends with the last frame at rest; the count starts anew."""
@@ -216,11 +240,14 @@ class _Book:
             disturbance=None
             if self._start is None or truth is None
             else Disturbance(self._pushed, motion_between(self._start, self._before, truth.poses)),
+            in_motion=in_motion(self._overlap_f, overlap_f_of(self._moved, mask, truth.labels))
+            if truth
+            else None,
         )
         if truth is not None:
             self._start, self._before = self._start or truth.poses, truth.poses
         self._pushed = self._next_pushed(frame, truth) if truth else None
-        self._frames, self._seen = 0, None
+        self._frames, self._seen, self._overlap_f, self._moved = 0, None, [], set()
         self._clock.seconds.clear()
         return step
 

@@ -7,6 +7,7 @@ import pytest
 from riseg_drake.app import bench
 from riseg_drake.app import run as run_module
 from riseg_drake.app.cli import main
+from riseg_drake.evaluation.in_motion import overlap_f_of
 from riseg_drake.evaluation.scores import score
 from riseg_drake.recording.reader import RecordingReader
 from riseg_drake.robot.kinematics import PandaKinematics
@@ -69,6 +70,27 @@ def test_the_scores_of_the_summary_are_those_of_the_written_images(finished):
         folder = finished / f"step_{entry['step']}"
         written = score(read(folder / "mask.png"), read(folder / "ground_truth.png"))
         assert entry["scores"] == pytest.approx(written.as_dict())
+
+
+def test_masks_while_things_move_are_scored_in_every_frame_from_one_centimetre_on(finished):
+    content = summary(finished)
+    assert "in_motion" not in content["steps"][0]
+    figures = content["steps"][1]["in_motion"]
+    assert figures == content["in_motion"]
+    frames = list(RecordingReader(finished / "recording"))
+    moved = {name for name, motion in content["steps"][1]["motions"].items() if motion["moved_m"] >= 0.01}
+    assert moved
+    # The push takes 1.75 s of some 6 s; 1 cm is reached within it, and the way back is another 2 to 3 s.
+    between = [f for f in frames if f.time <= content["steps"][1]["time_s"]]
+    assert 0.15 * len(between) < figures["frames"] < 0.8 * len(between)
+    assert 0.5 < figures["overlap_f"] <= 1.0
+    assert figures["at_rest_f"] == pytest.approx(
+        overlap_f_of(
+            {int(i) for i, name in content["objects"].items() if name in moved},
+            read(finished / "step_1" / "mask.png"),
+            read(finished / "step_1" / "ground_truth.png"),
+        )
+    )
 
 
 def test_every_stage_is_evaluated_once_a_frame(finished):
