@@ -40,8 +40,8 @@ def moved_objects(
 
 
 def overlap_f_of(moved: Iterable[int], mask: NDArray, labels: NDArray) -> float:
-    """Mean Overlap F of the moved objects in one mask [H, W] with its true labels [H, W]; NaN with none in
-    sight.
+    """Mean Overlap F, in [0, 1], of the moved objects in one mask [H, W] with its true labels [H, W]; NaN
+    with none in sight.
     """
     f = overlap_f_by_object(mask, labels)
     in_sight = [f[object_id] for object_id in moved if object_id in f]
@@ -49,7 +49,9 @@ def overlap_f_of(moved: Iterable[int], mask: NDArray, labels: NDArray) -> float:
 
 
 def in_motion(overlap_f: Sequence[float], at_rest_f: float) -> InMotion | None:
-    """One interaction, from the figures of its frames (NaN: nothing moved in sight); None where none counts."""
+    """One interaction, from the Overlap F of its frames, in [0, 1] (NaN: nothing moved in sight), and that at
+    rest; None where no frame counts.
+    """
     seen = [f for f in overlap_f if not np.isnan(f)]
     return InMotion(len(seen), float(np.mean(seen)), at_rest_f) if seen else None
 

@@ -8,10 +8,12 @@ from pydrake.common.value import Value
 
 from riseg_drake.geometry.camera import Intrinsics, rays
 from riseg_drake.geometry.rgbd import NO_PAIR, Frame, FramePair
+from riseg_drake.pushing import push_planning
 from riseg_drake.pushing.decision import UNDECIDED, Ending
 from riseg_drake.pushing.push import NO_PUSH
+from riseg_drake.pushing.push_path import plan_push_path
 from riseg_drake.pushing.tried_pushes import TriedPush
-from riseg_drake.robot.kinematics import PandaKinematics, observe_pose
+from riseg_drake.robot.kinematics import PandaKinematics, observation_posture, observe_pose
 from riseg_drake.systems.push_planner import PushPlanner
 
 CAMERA = Intrinsics(640, 480, 616.285, 615.778, 301.418, 232.864)
@@ -35,7 +37,16 @@ def q_observe(panda):
 
 
 @pytest.fixture(scope="module")
+def q_leaning(panda):
+    return observation_posture(panda, [0.5, 0.0], 0.5, pitch=np.pi / 4)
+
+
+@pytest.fixture(scope="module")
 def scene(panda, q_observe):
+    return seen_from(panda, q_observe)
+
+
+def seen_from(panda, q_observe):
     """A flat cylinder of 3 cm radius and 4 cm height at (0.5, 0.05), as the wrist camera sees its top."""
     X_WC = panda.X_WC(q_observe)
     direction_W = rays(CAMERA) @ X_WC[:3, :3].T
@@ -72,6 +83,27 @@ def test_push_goes_through_the_object_and_has_a_path_from_here_to_here(panda, q_
     reached = panda.X_WE(push.path.position(push.path.push_end))[:2, 3]
     # The bar's face has moved the object's outline by d_push: what is left to the center is less.
     assert np.linalg.norm(reached - push.center_W) == pytest.approx(0.03 + 0.01 - 0.02, abs=0.003)
+
+
+def test_from_a_view_at_45_degrees_a_push_with_a_path_is_found_at_once(panda, q_leaning, monkeypatch):
+    asked = []
+
+    def plan_path(*arguments):
+        asked.append(plan_push_path(*arguments))
+        return asked[-1]
+
+    monkeypatch.setattr(push_planning, "plan_push_path", plan_path)
+    decision = evaluate(panda, q_leaning, *seen_from(panda, q_leaning), NOTHING)
+    assert decision.ending is None
+    assert decision.push.center_W == pytest.approx([0.5, 0.05], abs=0.003)
+    assert decision.push.path.position(0.0) == pytest.approx(q_leaning)
+    assert decision.push.path.position(decision.push.path.duration) == pytest.approx(q_leaning)
+    reached = panda.X_WE(decision.push.path.position(decision.push.path.push_end))
+    assert np.linalg.norm(reached[:2, 3] - decision.push.center_W) == pytest.approx(
+        0.03 + 0.01 - 0.02, abs=0.004
+    )
+    np.testing.assert_allclose(reached[:3, 2], [0, 0, -1], atol=2e-3)
+    assert len(asked) <= 5  # of some 270 valid candidates
 
 
 def test_segmented_scene_gives_null(panda, q_observe, scene):
