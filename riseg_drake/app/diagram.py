@@ -25,6 +25,7 @@ from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.segmentation_block import STATION_PORTS, add_segmentation
 from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.pushing.decision import Decision
 from riseg_drake.pushing.push import ArmPhase, Push
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture
 from riseg_drake.segmentation.segment import Segmentation
@@ -52,8 +53,8 @@ class WiredDiagram:
     """The whole of Alg. 1 around a station, and what an application reads from it.
 
     All ports of the station are exported under their own names, and the outputs of the stages: `pair`,
-    `above_table`, `expected_flow`, `optical_flow`, `groups`, `mask`, `segmentation`, `push`, `phase`,
-    `interaction_step`, `active_push`, and `refined` where the scenario names a SAM.
+    `above_table`, `expected_flow`, `optical_flow`, `groups`, `mask`, `segmentation`, `decision`, `phase`,
+    `interaction_step`, `active_push`, `last_decision`, and `refined` where the scenario names a SAM.
     """
 
     def __init__(
@@ -123,6 +124,10 @@ class WiredDiagram:
         """How many pushes are over."""
         return self.read("interaction_step", context)
 
+    def last_decision(self, context: Context) -> Decision:
+        """The last push that was decided on, or why there was none."""
+        return self.read("last_decision", context)
+
     def position(self, context: Context) -> NDArray[np.float64]:
         """Joint angles theta_t [7], rad."""
         return self.read("panda.position_measured", context)
@@ -165,7 +170,11 @@ def make_diagram(
             drivers = drivers or Drivers(Reception(DrakeLcm("memq://"), config.lcm))
             station = HardwareStation(config, drivers.reception, drivers.sink, meshcat=meshcat)
             q_observe = observation_posture(
-                kinematics, config.centre_W, config.observe_height, config.start_position
+                kinematics,
+                config.centre_W,
+                config.observe_height,
+                config.start_position,
+                config.observe_pitch,
             )
     except (ValueError, RuntimeError) as error:
         raise ScenarioError(" ".join(str(error).split())) from error
@@ -189,7 +198,7 @@ def make_diagram(
         builder.Connect(segmentation.outputs["settled_mask"], system.GetInputPort("mask"))
     builder.Connect(arm.GetOutputPort("position"), planner.GetInputPort("position"))
     builder.Connect(arm.GetOutputPort("tried_pushes"), planner.GetInputPort("tried_pushes"))
-    builder.Connect(planner.GetOutputPort("push"), arm.GetInputPort("push"))
+    builder.Connect(planner.GetOutputPort("decision"), arm.GetInputPort("decision"))
     builder.Connect(station.GetOutputPort("panda.position_measured"), arm.GetInputPort("position_measured"))
     builder.Connect(arm.GetOutputPort("position"), station.GetInputPort("panda.position"))
     refiner = add_refinement(builder, scenario, segmentation, arm)
@@ -204,8 +213,8 @@ def make_diagram(
         builder.ExportOutput(station.get_output_port(index), station.get_output_port(index).get_name())
     for name, port in segmentation.outputs.items():
         builder.ExportOutput(port, name)
-    builder.ExportOutput(planner.GetOutputPort("push"), "push")
-    for name in ("phase", "interaction_step", "active_push"):
+    builder.ExportOutput(planner.GetOutputPort("decision"), "decision")
+    for name in ("phase", "interaction_step", "active_push", "last_decision"):
         builder.ExportOutput(arm.GetOutputPort(name), name)
     if refiner is not None:
         builder.ExportOutput(refiner.GetOutputPort("refined"), "refined")

@@ -21,7 +21,8 @@ from riseg_drake.app.scene_pool import Pool, cluster_pool, local_pool
 from riseg_drake.app.tables import score_table
 from riseg_drake.evaluation.disturbance import disturbance_of_all, disturbance_of_steps
 from riseg_drake.evaluation.figure import draw_figure
-from riseg_drake.evaluation.report import FIGURE_FILE, report_text
+from riseg_drake.evaluation.in_motion import in_motion_of_steps, mean_over_scenes
+from riseg_drake.evaluation.report import FIGURE_FILE, ending_counts, report_text
 from riseg_drake.evaluation.scene_result import OURS, SceneResult, scores_by_method, scores_by_switch
 from riseg_drake.evaluation.step_means import step_deviations, step_means
 from riseg_drake.learned.sam import load_sam
@@ -212,18 +213,33 @@ def _figures(results: Sequence[SceneResult], last_step: int) -> dict[str, Any]:
             "interactions": [asdict(figures) for figures in _disturbances(results, last_step)],
             "all": asdict(disturbance_of_all([result.disturbances for result in results])),
         },
+        "in_motion": {
+            "interactions": [
+                {"scenes": number, **(asdict(mean) if mean else {})}
+                for number, mean in in_motion_of_steps([result.in_motion for result in results], last_step)
+            ],
+            "all": _in_motion_of_all(results),
+        },
+        "ended": ending_counts(results),
         "runs": [
             {
                 "scene": result.name,
                 "seed": result.seed,
                 "interactions": result.interactions,
                 "end": result.end,
+                "ended": result.ended or None,
+                "unsettled_area_m2": result.unsettled_area_m2,
                 "failure": result.failure,
                 "scores": result.scores[-1].as_dict() if result.scores else None,
             }
             for result in results
         ],
     }
+
+
+def _in_motion_of_all(results: Sequence[SceneResult]) -> dict[str, Any]:
+    number, mean = mean_over_scenes([result.in_motion for result in results])
+    return {"scenes": number, **(asdict(mean) if mean else {})}
 
 
 def _disturbances(results: Sequence[SceneResult], last_step: int) -> list[Any]:
@@ -241,4 +257,7 @@ def _by_step(scores: Sequence[Sequence[Any]], last_step: int) -> list[dict[str, 
 def _print_scores(results: Sequence[SceneResult], last_step: int, console: Console) -> None:
     rows = [(method, step_means(scores, last_step)[-1]) for method, scores in scores_by_method(results).items()]
     console.print(f"\nafter the last interaction, means over {_count(len(results))}, in percent")
-    console.print(score_table(rows, first="\nmethod"))
+    _, moved = mean_over_scenes([result.in_motion for result in results])
+    console.print(score_table(rows, first="\nmethod", in_motion={OURS: moved.overlap_f} if moved else {}))
+    endings = ", ".join(f"{number} {ended}" for ended, number in ending_counts(results).items())
+    console.print(f"ended: {endings}")

@@ -106,7 +106,9 @@ class _Collector:
 
 def _postures(kinematics: PandaKinematics, config: HardwareStationConfig) -> list[np.ndarray]:
     try:
-        q = observation_posture(kinematics, config.centre_W, config.observe_height, config.start_position)
+        q = observation_posture(
+            kinematics, config.centre_W, config.observe_height, config.start_position, config.observe_pitch
+        )
     except ValueError as error:
         raise ScenarioError(str(error)) from None
     X_WE = kinematics.X_WE(q)

@@ -1,7 +1,8 @@
 """Alg. 1: the robot acts and segments, and every interaction leaves L*_t behind."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +13,10 @@ from pydrake.systems.framework import Context, EventStatus
 from riseg_drake.app.diagram import WiredDiagram
 from riseg_drake.app.output import Step
 from riseg_drake.evaluation.disturbance import Disturbance, motion_between, object_at
+from riseg_drake.evaluation.in_motion import in_motion, moved_objects, overlap_f_of
 from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.pushing.decision import UNDECIDED, Decision, Ending
 from riseg_drake.pushing.push import NO_PUSH, ArmPhase, Push
 from riseg_drake.systems.stage_clock import StageClock
 
@@ -25,12 +28,17 @@ Listener = Callable[[Frame, Context], None]
 class Truth:
     """What somebody knows who may cheat, of the moment of one frame."""
 
-    labels: NDArray[np.uint16]
-    """The true visible object ids [H, W]."""
+    draw: Callable[[], NDArray[np.uint16]] = field(repr=False)
+    """Gives the true visible object ids [H, W]; drawing them takes as long as a picture."""
     poses: dict[str, NDArray[np.float64]]
     """The true poses X_WB [4, 4] of the objects, by name."""
     names: Mapping[int, str]
     """By object id."""
+
+    @cached_property
+    def labels(self) -> NDArray[np.uint16]:
+        """The true visible object ids [H, W]; must be asked for before the diagram goes on."""
+        return self.draw()
 
 
 TruthSource = Callable[[Frame, Context], Truth | None]
@@ -60,7 +68,11 @@ class Progress:
     """Since the start, s."""
     frames: int = 0
     end: str = ""
-    """Why the run ended; empty while it goes on."""
+    """Why the run ended, in words; empty while it goes on."""
+    decision: Decision = UNDECIDED
+    """That to end; UNDECIDED while the run goes on, and where somebody else ended it."""
+    unsettled_area: float = float("nan")
+    """What was yet to be segmented at the last decision, m^2; NaN before the first."""
 
 
 def interactions(
@@ -75,8 +87,8 @@ def interactions(
 ) -> Iterator[Step]:
     """Run Alg. 1; yields how things stand before the first and after every interaction.
 
-    It ends when the arm is done (no push is left, a_i = null, or enough were made), or when `longest`
-    seconds have passed; `progress.end` says which. At wall time also when somebody else has set
+    It ends when the arm is done (a_i = null, or enough pushes were made), or when `longest` seconds have
+    passed; `progress.end` and `progress.decision` say which. At wall time also when somebody else has set
     `progress.end`; how things stand then is yielded, too. The truth is that of the simulation if not given.
     """
     clock.watch(wired.stages)
@@ -104,21 +116,39 @@ def interactions(
         if decided:
             yield book.close(wired.interaction_step(context))  # line 10
             progress.interaction_step += 1  # line 9
+        decision = wired.last_decision(context)
+        progress.unsettled_area = decision.unsettled_area
         if news.phase is ArmPhase.DONE:
+            progress.decision = decision
             made = wired.interaction_step(context)
-            enough = made >= wired.most_interactions
-            progress.end = progress.end or (
-                f"{made} of {made} interactions were made" if enough else "no push is left that could find more"
-            )
+            progress.end = progress.end or _why(decision, made, wired.most_interactions)
         elif progress.time >= longest:
-            progress.end = f"{longest:g} s were {'over' if wall else 'simulated'}"
+            progress.decision = Decision(ending=Ending.TIME, unsettled_area=decision.unsettled_area)
+            progress.end = _and(f"{longest:g} s were {'over' if wall else 'simulated'}", progress.decision.why)
         elif progress.end and wall and book.has_seen:
             yield book.close(wired.interaction_step(context))
 
 
+def _why(decision: Decision, made: int, most: int) -> str:
+    """Why the arm is done, in words."""
+    if decision.ending is None:
+        return "the operator ended it"
+    if decision.ending is Ending.ENOUGH_INTERACTIONS:
+        return _and(f"{made} of {most} interactions were made", decision.why)
+    return decision.why
+
+
+def _and(*parts: str) -> str:
+    return ", ".join(part for part in parts if part)
+
+
 def simulated_truth(wired: WiredDiagram) -> TruthSource:
     """The truth that a simulated station knows."""
-    return lambda _, context: Truth(wired.true_labels(context), wired.true_poses(context), wired.object_names)
+
+    def truth(_: Frame, context: Context) -> Truth:
+        return Truth(lambda: wired.true_labels(context), wired.true_poses(context), wired.object_names)
+
+    return truth
 
 
 class _Seen(NamedTuple):
@@ -166,6 +196,8 @@ class _Book:
         self._before: dict[str, NDArray] = {}  # and before the one that is under way,
         self._pushed: str | None = None  # and what that one pushes
         self._seen: _Seen | None = None
+        self._overlap_f: list[float] = []  # of the moved objects in each frame since then
+        self._moved: set[int] = set()
 
     @property
     def has_seen(self) -> bool:
@@ -173,13 +205,24 @@ class _Book:
         return self._seen is not None
 
     def count(self, frame: Frame, is_at_rest: bool) -> None:
-        """Take note of a frame; of one at rest also of the truth of the same moment."""
+        """Take note of a frame, and of the truth of the same moment where it counts."""
         self._frames += 1
-        if not is_at_rest:
-            return
         truth = self._truth(frame, self._context)
+        if not is_at_rest:
+            if truth is not None:
+                self._count_moved(truth)
+            return
+        if truth is not None:
+            _ = truth.labels
         if truth is not None or self._seen is None or self._seen.truth is None:
             self._seen = _Seen(frame, self._wired.mask(self._context), truth)
+
+    def _count_moved(self, truth: Truth) -> None:
+        """Score what has moved in this interaction. Labels are drawn only where there is such a thing."""
+        moved = moved_objects(self._before, truth.poses, truth.names)
+        if moved:
+            self._moved |= moved
+            self._overlap_f.append(overlap_f_of(moved, self._wired.mask(self._context), truth.labels))
 
     def close(self, interaction_step: int) -> Step:
         """The step that ends with the last frame at rest; the count starts anew."""
@@ -198,11 +241,14 @@ class _Book:
             disturbance=None
             if self._start is None or truth is None
             else Disturbance(self._pushed, motion_between(self._start, self._before, truth.poses)),
+            in_motion=in_motion(self._overlap_f, overlap_f_of(self._moved, mask, truth.labels))
+            if truth
+            else None,
         )
         if truth is not None:
             self._start, self._before = self._start or truth.poses, truth.poses
         self._pushed = self._next_pushed(frame, truth) if truth else None
-        self._frames, self._seen = 0, None
+        self._frames, self._seen, self._overlap_f, self._moved = 0, None, [], set()
         self._clock.seconds.clear()
         return step
 

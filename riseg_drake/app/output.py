@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.evaluation.disturbance import Disturbance
+from riseg_drake.evaluation.in_motion import InMotion
 from riseg_drake.evaluation.scores import Scores
 from riseg_drake.pictures.masks import draw_masks
 from riseg_drake.recording.whole_file import write_png, write_text
@@ -59,6 +60,8 @@ class Step:
     refined_scores: Scores | None = None
     disturbance: Disturbance | None = None
     """What the interaction did to the objects; only in simulation, and not in step 0."""
+    in_motion: InMotion | None = None
+    """How well they were segmented while they moved; the same, and only where one moved in sight."""
 
     @property
     def objects(self) -> int:
@@ -164,6 +167,8 @@ def _step_to_json(step: Step) -> dict[str, Any]:
         content["scores"] = step.scores.as_dict()
     if step.refined_scores is not None:
         content["refined_scores"] = step.refined_scores.as_dict()
+    if step.in_motion is not None:
+        content["in_motion"] = asdict(step.in_motion)
     if step.disturbance is not None:
         content["pushed"] = step.disturbance.pushed
         content["motions"] = {name: asdict(motion) for name, motion in step.disturbance.motions.items()}

@@ -2,11 +2,12 @@
 
 import resource
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 from pydrake.geometry import Meshcat, StartMeshcat
 from pydrake.systems.framework import Context
@@ -20,6 +21,7 @@ from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step, stage_fig
 from riseg_drake.app.run_recording import recording_of
 from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
 from riseg_drake.app.tables import score_table, stage_table
+from riseg_drake.evaluation.in_motion import pooled
 from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.recording.whole_file import write_text
@@ -81,6 +83,25 @@ def run(
     return steps
 
 
+def ending_figures(progress: Progress) -> dict[str, Any]:
+    """How a run ended and what was left, as the summary has it; `ended` is null where somebody ended it."""
+    decision = progress.decision
+    figures: dict[str, Any] = {
+        "ended": decision.ending.value if decision.ending else None,
+        "unsettled_area_m2": round(progress.unsettled_area, 6),
+    }
+    if decision.failed:
+        figures["candidates"] = decision.candidates
+        figures["candidates_failed"] = {what.name.lower(): number for what, number in decision.failed.items()}
+    return figures
+
+
+def in_motion_figures(steps: Sequence[Step]) -> dict[str, Any]:
+    """How well moved objects were segmented while they moved, over all steps; empty where nobody knows it."""
+    figures = pooled(step.in_motion for step in steps)
+    return {"in_motion": asdict(figures)} if figures else {}
+
+
 def peak_memory_mb() -> int:
     """The most memory this process has held so far, MB."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024  # Linux counts in kB
@@ -107,6 +128,8 @@ class Narrator:
         i = step.interaction_step
         when = f"after interaction {i}" if i else "before any push"
         f = f", Overlap F {100 * step.scores.overlap_f:.1f} %" if step.scores is not None else ""
+        if step.in_motion is not None:
+            f += f" ({100 * step.in_motion.overlap_f:.1f} % of what moved, while it moved)"
         self._console.print(f"{when}: {_objects(step.objects)} found{f}, {self._elapsed()}")
 
     def tell_end(self, progress: Progress) -> None:
@@ -137,6 +160,8 @@ def state_of(folder: RunFolder, progress: Progress, steps: list[Step]) -> Iterat
         folder.note(
             state=state,
             end=end,
+            **ending_figures(progress),
+            **in_motion_figures(steps),
             seconds=round(perf_counter() - start, 2),
             simulated_s=round(progress.time, 3),
             frames=progress.frames,
@@ -211,7 +236,8 @@ def report(steps: list[Step], console: Console) -> None:
     ]
     if rows:
         console.print("\nscores in percent, after each interaction")
-        console.print(score_table(rows, first="\nstep"))
+        moved = {str(s.interaction_step): s.in_motion.overlap_f for s in steps if s.in_motion is not None}
+        console.print(score_table(rows, first="\nstep", in_motion=moved))
     seconds: dict[str, list[float]] = defaultdict(list)
     for step in steps:
         for stage, times in step.stage_seconds.items():

@@ -17,6 +17,7 @@ from riseg_drake.app.ablation import versions
 from riseg_drake.app.output import RECORDING, SUMMARY, to_json
 from riseg_drake.evaluation.baselines import BASELINES
 from riseg_drake.evaluation.disturbance import Disturbance, ObjectMotion
+from riseg_drake.evaluation.in_motion import InMotion
 from riseg_drake.evaluation.scene_result import SAM_METHODS, SceneResult
 from riseg_drake.evaluation.scores import Scores
 from riseg_drake.recording.layout import COLOR_LIST
@@ -110,8 +111,11 @@ def read_result(task: SceneTask, failure: str = "") -> SceneResult:
         seed=task.seed,
         failure=failure or ("" if summary.get("state") == "done" else end),
         end=end,
+        ended=summary.get("ended") or "",
+        unsettled_area_m2=_number(summary.get("unsettled_area_m2")),
         scores=[Scores.from_dict(step["scores"]) for step in steps],
         disturbances=[_disturbance(step) for step in steps[1:]],
+        in_motion=[_in_motion(step.get("in_motion")) for step in steps[1:]],
         baselines={name: baselines[name] for name in task.baselines if name in baselines},
         ablation=_scores_from_json(ablation.get("scores", {})),
         ablation_failures=ablation.get("failures", {}),
@@ -136,6 +140,17 @@ def _run_is_finished(task: SceneTask) -> bool:
 def _disturbance(step: Mapping[str, Any]) -> Disturbance:
     motions = {name: ObjectMotion(**motion) for name, motion in step.get("motions", {}).items()}
     return Disturbance(step.get("pushed"), motions)
+
+
+def _in_motion(figures: Mapping[str, Any] | None) -> InMotion | None:
+    if figures is None:
+        return None
+    return InMotion(int(figures["frames"]), _number(figures["overlap_f"]), _number(figures["at_rest_f"]))
+
+
+def _number(value: float | None) -> float:
+    """A number as JSON has it, where NaN is null."""
+    return float("nan") if value is None else float(value)
 
 
 def _scores_from_json(content: Mapping[str, Any]) -> dict[str, list[Scores]]:

@@ -8,12 +8,19 @@ from rich.table import Table
 from riseg_drake.evaluation.scores import Scores
 
 
-def score_table(rows: Iterable[tuple[str, Scores]], first: str) -> Table:
-    """One row a name, in percent like the paper's table; an object with Overlap F above 75 % is found."""
+def score_table(
+    rows: Iterable[tuple[str, Scores]], first: str, in_motion: Mapping[str, float] | None = None
+) -> Table:
+    """One row a name, in percent like the paper's table; an object with Overlap F above 75 % is found.
+
+    With `in_motion` a last column has the Overlap F of what moved, while it moved, by the rows' names.
+    """
     table = Table(box=box.SIMPLE, padding=(0, 1, 0, 0))
     table.add_column(first, justify="left", no_wrap=True)
     for column in ("Overlap\nP", "\nR", "\nF", "Boundary\nP", "\nR", "\nF", "found\n%", "\nobjects"):
         table.add_column(column, justify="right", no_wrap=True)
+    if in_motion:
+        table.add_column("in motion\nF", justify="right", no_wrap=True)
     for name, scores in rows:
         shares = (
             scores.overlap_precision,
@@ -24,8 +31,11 @@ def score_table(rows: Iterable[tuple[str, Scores]], first: str) -> Table:
             scores.boundary_f,
             scores.found_share,
         )
+        moved: tuple[str, ...] = ()
+        if in_motion:
+            moved = (f"{100 * in_motion[name]:.1f}" if name in in_motion else "",)
         objects = f"{_count(scores.objects_found)} of {_count(scores.objects_true)}"
-        table.add_row(name, *(f"{100 * share:.1f}" for share in shares), objects)
+        table.add_row(name, *(f"{100 * share:.1f}" for share in shares), objects, *moved)
     return table
 
 

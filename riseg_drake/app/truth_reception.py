@@ -38,10 +38,10 @@ class TruthReception:
         labels, poses = self._labels.get(stamp), self._poses.get(stamp)
         if labels is None or poses is None:
             return None
-        true_labels, true_poses = decode_labels(lcmt_image_array.decode(labels)), decode_poses(poses)
+        true_poses = decode_poses(poses)
         columns = slice(self._first_column, self._first_column + frame.color.shape[1])
         return Truth(
-            labels=true_labels.labels[:, columns],
+            draw=lambda: decode_labels(lcmt_image_array.decode(labels)).labels[:, columns],
             poses={true_poses.names[i]: X_WB for i, X_WB in true_poses.X_WB.items()},
             names=true_poses.names,
         )

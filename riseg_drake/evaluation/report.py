@@ -1,5 +1,6 @@
 """The report of an evaluation, in Markdown: the paper's table with ours in it, and what else was seen."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from math import isnan
 
@@ -11,6 +12,7 @@ from riseg_drake.evaluation.disturbance import (
     disturbance_of_all,
     disturbance_of_steps,
 )
+from riseg_drake.evaluation.in_motion import MOVED, in_motion_of_steps, mean_over_scenes, pooled
 from riseg_drake.evaluation.published import PUBLISHED
 from riseg_drake.evaluation.scene_result import OURS, SceneResult, scores_by_method, scores_by_switch
 from riseg_drake.evaluation.scores import FOUND_ABOVE_F, Scores
@@ -36,8 +38,12 @@ def report_text(scenes: Sequence[SceneResult], about: Mapping[str, object], last
         "## Scores after each interaction\n",
         _score_section(scenes, last_step),
         f"![share of objects found after each interaction]({FIGURE_FILE})\n",
+        "## Masks while things move\n",
+        _in_motion_section(scenes, last_step),
         "## What the interactions did to the scene\n",
         _disturbance_section(scenes, last_step),
+        "## How the runs ended\n",
+        _ending_section(scenes),
         "## The scenes, worst first\n",
         _scene_section(scenes, last_step),
     ]
@@ -89,6 +95,46 @@ own, on its own 20 real scenes; the other rows are on the images of this evaluat
     )
 
 
+def _in_motion_section(scenes: Sequence[SceneResult], last_step: int) -> str:
+    interactions = [scene.in_motion for scene in scenes]
+    names = [*map(str, range(1, last_step + 1)), "**all**"]
+    figures = [*in_motion_of_steps(interactions, last_step), mean_over_scenes(interactions)]
+    rows = []
+    for name, (number, mean) in zip(names, figures, strict=True):
+        cells = ["0", "–", "–"] if mean is None else []
+        if mean is not None:
+            cells = [str(mean.frames), _percent(mean.overlap_f), _percent(mean.at_rest_f)]
+        rows.append([name, str(number), *cells])
+    return (
+        _table(("interaction", "scenes", "frames", "Overlap F in motion", "at rest after it"), rows)
+        + f"""
+Overlap F of the objects that the interaction has moved by {100 * MOVED:g} cm or more so far, in every
+frame from then on until the camera observes again, and the same objects' in the last frame at rest. Means
+over frames, then over scenes, in percent.
+"""
+    )
+
+
+def ending_counts(scenes: Sequence[SceneResult]) -> dict[str, int]:
+    """How many runs ended for each reason, the most frequent first."""
+    return dict(Counter(scene.ended or "otherwise" for scene in scenes if not scene.failure).most_common())
+
+
+def _ending_section(scenes: Sequence[SceneResult]) -> str:
+    rows = []
+    for ended, number in ending_counts(scenes).items():
+        areas = [s.unsettled_area_m2 for s in scenes if not s.failure and (s.ended or "otherwise") == ended]
+        known = [1e4 * area for area in areas if not isnan(area)]
+        mean, most = (np.mean(known), max(known)) if known else (float("nan"), float("nan"))
+        rows.append([ended, str(number), _number(float(mean), 1), _number(float(most), 1)])
+    return (
+        _table(("reason", "scenes", "left, mean cm^2", "most"), rows)
+        + """
+*left* is what stands on the table and is yet to be segmented, as the push planner sees it.
+"""
+    )
+
+
 def _disturbance_section(scenes: Sequence[SceneResult], last_step: int) -> str:
     disturbances = [scene.disturbances for scene in scenes]
     rows = [
@@ -132,6 +178,7 @@ def _scene_section(scenes: Sequence[SceneResult], last_step: int) -> str:
         last = carried(scene.scores, last_step)[-1]
         picture = f"[{scene.name}]({scene.name}/step_{scene.interactions}/overlay.png)"
         found = "–" if isnan(last.objects_true) else f"{last.objects_found:g} of {last.objects_true:g}"
+        moved = pooled(scene.in_motion)
         figures = [_percent(last.overlap_f), _percent(last.boundary_f), found]
         rows.append(
             [
@@ -139,10 +186,13 @@ def _scene_section(scenes: Sequence[SceneResult], last_step: int) -> str:
                 str(scene.seed),
                 str(scene.interactions),
                 *figures,
+                "–" if moved is None else _percent(moved.overlap_f),
                 scene.failure or scene.end,
             ]
         )
-    return _table(("scene", "seed", "interactions", "Overlap F", "Boundary F", "found", "end"), rows)
+    return _table(
+        ("scene", "seed", "interactions", "Overlap F", "Boundary F", "found", "F in motion", "end"), rows
+    )
 
 
 def _failures(scenes: Sequence[SceneResult]) -> str:

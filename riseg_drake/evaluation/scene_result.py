@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from riseg_drake.evaluation.disturbance import Disturbance
+from riseg_drake.evaluation.in_motion import InMotion
 from riseg_drake.evaluation.scores import Scores
 
 OURS = "riseg_drake"
@@ -24,11 +25,17 @@ class SceneResult:
     failure: str
     """Why the run failed, in one line; empty if it ended by itself."""
     end: str
-    """Why the run ended."""
+    """Why the run ended, in words."""
+    ended: str = ""
+    """The same as one of five: nothing_left, nothing_valid, no_path, enough_interactions, time; or empty."""
+    unsettled_area_m2: float = float("nan")
+    """What was yet to be segmented then, m^2."""
     scores: Sequence[Scores] = ()
     """Of our masks, from step 0 on."""
     disturbances: Sequence[Disturbance] = ()
     """Of the interactions, from the first on."""
+    in_motion: Sequence[InMotion | None] = ()
+    """Of the interactions, from the first on; None where nothing moved in sight."""
     baselines: Mapping[str, Sequence[Scores]] = field(default_factory=dict)
     """Of other methods on the same images, by name, from step 0 on."""
     ablation: Mapping[str, Sequence[Scores]] = field(default_factory=dict)

@@ -77,17 +77,10 @@ def score(prediction: NDArray, ground_truth: NDArray) -> Scores:
     if len(predicted) == 0 or len(true) == 0:
         return _scores_of_nothing(len(predicted), len(true))
 
-    tp = _overlaps(prediction, ground_truth, predicted, true)  # [true, predicted]
     predicted_area = np.array([_area(prediction == j) for j in predicted])
     true_area = np.array([_area(ground_truth == i) for i in true])
-    p = tp / predicted_area[None, :]
-    r = tp / true_area[:, None]
-    with np.errstate(invalid="ignore"):
-        f = np.where(p + r > 0, 2 * p * r / (p + r), 0.0)
-
-    # Which of several equally good assignments is taken decides the Boundary figures: all of the field
-    # uses the classic Munkres procedure, so we do, rather than another solver with the same optimum.
-    pairs = Munkres().compute((f.max() - f).tolist())
+    tp = _overlaps(prediction, ground_truth, predicted, true)  # [true, predicted]
+    f, pairs = _assigned(tp, predicted_area, true_area)
     overlap = sum(int(tp[i, j]) for i, j in pairs)
     found = sum(f[i, j] > FOUND_ABOVE_F for i, j in pairs)
     overlap_p = overlap / predicted_area.sum()
@@ -105,6 +98,24 @@ def score(prediction: NDArray, ground_truth: NDArray) -> Scores:
         objects_true=float(len(true)),
         found_share=found / len(true),
     )
+
+
+def overlap_f_by_object(prediction: NDArray, ground_truth: NDArray) -> dict[int, float]:
+    """Overlap F of every object of the ground truth with the predicted one that is assigned to it, else 0.
+
+    Both are label images [H, W]; the assignment is that of `score`.
+    """
+    predicted = _objects(prediction)
+    true = _objects(ground_truth)
+    by_object = dict.fromkeys(true.tolist(), 0.0)
+    if len(predicted) == 0 or len(true) == 0:
+        return by_object
+    predicted_area = np.array([_area(prediction == j) for j in predicted])
+    true_area = np.array([_area(ground_truth == i) for i in true])
+    tp = _overlaps(prediction, ground_truth, predicted, true)
+    f, pairs = _assigned(tp, predicted_area, true_area)
+    by_object.update((int(true[i]), float(f[i, j])) for i, j in pairs)
+    return by_object
 
 
 def mean_scores(scores: Sequence[Scores]) -> Scores:
@@ -143,6 +154,19 @@ def _overlaps(prediction: NDArray, ground_truth: NDArray, predicted: NDArray, tr
     j = np.searchsorted(predicted, prediction[both])
     cells = np.bincount(i * len(predicted) + j, minlength=len(true) * len(predicted))
     return cells.reshape(len(true), len(predicted))
+
+
+def _assigned(
+    tp: NDArray, predicted_area: NDArray, true_area: NDArray
+) -> tuple[NDArray[np.float64], list[tuple[int, int]]]:
+    """Overlap F of all pairs [true, predicted], and the pairs whose sum of F is greatest."""
+    p = tp / predicted_area[None, :]
+    r = tp / true_area[:, None]
+    with np.errstate(invalid="ignore"):
+        f = np.where(p + r > 0, 2 * p * r / (p + r), 0.0)
+    # Which of several equally good assignments is taken decides the Boundary figures: all of the field
+    # uses the classic Munkres procedure, so we do, rather than another solver with the same optimum.
+    return f, Munkres().compute((f.max() - f).tolist())
 
 
 def _boundary_scores(

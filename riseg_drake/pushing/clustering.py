@@ -6,12 +6,13 @@ could be used as well. All work on points of the table in metres.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 from sklearn.cluster import KMeans, MeanShift
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 
 @dataclass
@@ -119,9 +120,15 @@ def _k_means(
     """Centers [k, 2] and inertia (MacQueen 1967, with k-means++ starts)."""
     seed = int(rng.integers(2**31))
     # Several threads would share the sums, which then come out differently in their last bits.
-    with threadpool_limits(1):
+    with _threads().limit(limits=1):
         fit = KMeans(n_clusters=k, n_init=restarts, max_iter=60, random_state=seed).fit(points)
     return fit.cluster_centers_, float(fit.inertia_)
+
+
+@cache
+def _threads() -> ThreadpoolController:
+    """Looked up once: a look through all loaded libraries takes as long as the clustering."""
+    return ThreadpoolController()
 
 
 def _k_medoids(

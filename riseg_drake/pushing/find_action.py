@@ -1,5 +1,6 @@
-"""Alg. 3 of the paper: FindAction, the push that is to be done next, or null (None)."""
+"""Alg. 3 of the paper: FindAction, the push that is to be done next, or null and the reason."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -9,14 +10,23 @@ from numpy.typing import NDArray
 from riseg_drake.pushing.boundary import BoundaryParameters, boundary
 from riseg_drake.pushing.clusters import Cluster, ClustersParameters, find_clusters
 from riseg_drake.pushing.contact import find_contacts
+from riseg_drake.pushing.decision import Criterion, Decision, Ending, PathStage
 from riseg_drake.pushing.objects_to_segment import ObjectsToSegmentParameters, objects_to_segment
-from riseg_drake.pushing.push import Push
+from riseg_drake.pushing.push import NO_PUSH, Push
 from riseg_drake.pushing.push_path import PushPath
 from riseg_drake.pushing.pusher import Pusher
 from riseg_drake.pushing.ranking import RankingParameters, cost_of_pushes
 from riseg_drake.pushing.table_map import TableMap, TableMapParameters
 from riseg_drake.pushing.tried_pushes import TriedPush
 from riseg_drake.pushing.validity import ValidityParameters, is_valid_push
+
+ALIKE_DISTANCE = 0.010
+"""Where the arm has no path for a push, it is not asked about another that begins this close to it, m ..."""
+ALIKE_ANGLE = 0.2
+"""... and goes within this angle of its direction, rad."""
+
+PlanPath = Callable[[Push], PushPath | PathStage]
+"""The arm's path for a push, or the stage of it that it cannot do."""
 
 
 @dataclass
@@ -31,7 +41,7 @@ class FindActionParameters:
     pusher: Pusher = field(default_factory=Pusher)
     ranking: RankingParameters = field(default_factory=RankingParameters)
     paths: int = 30
-    """The arm's path is planned for at most this many candidates, the best, before finer clusters."""
+    """The arm's path is planned for at most this many candidates, the best that are not alike."""
 
 
 def find_action(
@@ -41,10 +51,9 @@ def find_action(
     *,
     tried: Sequence[TriedPush] = (),
     heading_W: NDArray | None = None,
-    plan_path: Callable[[Push], PushPath | None] | None = None,
-) -> Push | None:
-    """FindAction: the best valid push that the arm can do, or None when there is nothing to segment or
-    no such push.
+    plan_path: PlanPath | None = None,
+) -> Decision:
+    """FindAction: the best valid push that the arm can do, or why there is none.
 
     Args:
         table: line 1, objMask on the map, with binL (line 2) beside it.
@@ -52,60 +61,106 @@ def find_action(
         parameters: the defaults if None.
         tried: pushes made so far.
         heading_W: [2], where the tool's +x points now; turning away from it costs time.
-        plan_path: the arm's path for a push, None where it cannot do it. Without it every push counts
+        plan_path: the arm's path for a push, or the stage that it cannot do. Without it every push counts
             as reachable and comes without a path.
     """
     parameters = parameters or FindActionParameters()
     to_segment = objects_to_segment(table, parameters.to_segment)  # line 3
-    if not to_segment.any():  # line 4
-        return None  # line 5
+    area = float(np.count_nonzero(to_segment)) * table.cell_area
+    if not area:  # line 4
+        return Decision(ending=Ending.NOTHING_LEFT, unsettled_area=0.0)  # line 5
+    search = _PathSearch(plan_path, parameters.paths)
     rounds = find_clusters(to_segment, table, parameters.clusters, rng)  # line 6
     divisions = []
     for clusters in rounds:
         divisions.append(clusters)
-        push = best_push(clusters, table, tried, heading_W, plan_path, parameters)
+        pushes, failed = valid_pushes(clusters, table, tried, heading_W, parameters)
+        push = search.best(pushes)
         if push is not None:
-            return push  # lines 11, 12
+            return Decision(push, unsettled_area=area)  # lines 11, 12
     if parameters.validity.l_act_last > parameters.validity.l_act:
         validity = replace(parameters.validity, l_act=parameters.validity.l_act_last)
         parameters = replace(parameters, validity=validity)
-        for clusters in divisions:
-            push = best_push(clusters, table, tried, heading_W, plan_path, parameters)
-            if push is not None:
-                return push
-    return None  # line 17
+    # Once more, with the last l_act, and to count what it is that fails.
+    candidates, fails = 0, Counter[Criterion | PathStage]()
+    for clusters in divisions:
+        pushes, failed = valid_pushes(clusters, table, tried, heading_W, parameters)
+        push = search.best(pushes)
+        if push is not None:
+            return Decision(push, unsettled_area=area)
+        for criterion, which in failed.items():
+            fails[criterion] += int(np.count_nonzero(which))
+        candidates += len(failed[Criterion.ACCESSIBLE])
+    if search.failed:  # line 17
+        return Decision(NO_PUSH, Ending.NO_PATH, area, search.failed.total(), search.failed)
+    return Decision(NO_PUSH, Ending.NOTHING_VALID, area, candidates, +fails)
 
 
-def best_push(
+class _PathSearch:
+    """The arm's path for the best push that has one."""
+
+    def __init__(self, plan_path: PlanPath | None, most: int):
+        self._plan_path, self._most = plan_path, most
+        self._places: list[NDArray] = []  # p_WE and direction of the pushes that have no path
+        self._directions: list[NDArray] = []
+        self.failed: Counter[Criterion | PathStage] = Counter()
+        """How many pushes failed at each stage."""
+
+    def best(self, pushes: list[Push]) -> Push | None:
+        """The first of the pushes, best first, that the arm can do."""
+        if self._plan_path is None:
+            return pushes[0] if pushes else None
+        for push in pushes:
+            if len(self._places) == self._most:
+                return None
+            if self._is_like_one_that_failed(push):
+                continue
+            path = self._plan_path(push)
+            if not isinstance(path, PathStage):
+                return replace(push, path=path)
+            self.failed[path] += 1
+            self._places.append(push.p_WE[:2])
+            self._directions.append(push.direction_W)
+        return None
+
+    def _is_like_one_that_failed(self, push: Push) -> bool:
+        if not self._places:
+            return False
+        near = np.linalg.norm(np.array(self._places) - push.p_WE[:2], axis=1) < ALIKE_DISTANCE
+        alike = np.array(self._directions) @ push.direction_W > np.cos(ALIKE_ANGLE)
+        return bool(np.any(near & alike))
+
+
+def valid_pushes(
     clusters: Sequence[Cluster],
     table: TableMap,
     tried: Sequence[TriedPush],
     heading_W: NDArray | None,
-    plan_path: Callable[[Push], PushPath | None] | None,
     parameters: FindActionParameters,
-) -> Push | None:
-    """The best of the valid pushes of all clusters that the arm can do (lines 7 to 12); None if none.
+) -> tuple[list[Push], dict[Criterion, NDArray[np.bool_]]]:
+    """The valid pushes of all clusters, best first (lines 7 to 10), and which candidates [N] fail what.
 
     `heading_W` is the direction [2] in which the pusher points now; None: all are alike.
     """
     largest = max(int(cluster.cells.sum()) for cluster in clusters)
     pushes: list[Push] = []
+    failed: dict[Criterion, list[NDArray]] = {criterion: [] for criterion in Criterion}
     for cluster in clusters:  # line 8
         B = boundary(cluster.cells, cluster.center_W, table, parameters.boundary)  # line 7
-        pushes += valid_pushes(  # lines 9, 10
+        if not len(B):
+            continue
+        valid, fails = valid_pushes_of(  # lines 9, 10
             B, cluster, table, largest, tried, heading_W, parameters
         )
+        pushes += valid
+        for criterion, which in fails.items():
+            failed[criterion].append(which)
     pushes.sort(key=lambda push: push.cost)
-    if plan_path is None:
-        return pushes[0] if pushes else None
-    for push in pushes[: parameters.paths]:
-        path = plan_path(push)
-        if path is not None:
-            return replace(push, path=path)
-    return None
+    none = [np.zeros(0, bool)]
+    return pushes, {criterion: np.concatenate(which or none) for criterion, which in failed.items()}
 
 
-def valid_pushes(
+def valid_pushes_of(
     boundary_W: NDArray,
     cluster: Cluster,
     table: TableMap,
@@ -113,14 +168,13 @@ def valid_pushes(
     tried: Sequence[TriedPush],
     heading_W: NDArray | None,
     parameters: FindActionParameters,
-) -> list[Push]:
-    """The pushes from boundary points [N, 2] towards the center of their cluster that are valid.
+) -> tuple[list[Push], dict[Criterion, NDArray[np.bool_]]]:
+    """The valid pushes from boundary points [N, 2], N >= 1, towards the center of their cluster, and which
+    candidates [N] fail what.
 
     Beyond the paper's IsValidPush: the bar touches the cluster before anything else, low enough but not
     too close to the table, and nothing is driven out of the work area.
     """
-    if not len(boundary_W):
-        return []
     validity, pusher = parameters.validity, parameters.pusher
     center_W, P = cluster.center_W, cluster.cells
     direction_W = center_W - boundary_W
@@ -131,18 +185,20 @@ def valid_pushes(
         contacts, direction_W, is_valid.overlap, P, table, largest_cluster, tried, heading_W,
         validity, parameters.ranking,
     )  # fmt: skip
-    possible = (
-        is_valid.valid
-        & contacts.high_enough
-        & contacts.only_target
-        & stays_in_work_area(direction_W, P, table, validity.d_push)
-        & np.isfinite(cost)
-    )
+    passed = {
+        Criterion.CENTER_ON_OBJECT: is_valid.center_on_object,
+        Criterion.ACCESSIBLE: is_valid.accessible,
+        Criterion.MOVES_ALONE: is_valid.moves_alone,
+        Criterion.HIGH_ENOUGH: contacts.high_enough,
+        Criterion.ONLY_TARGET: contacts.only_target,
+        Criterion.STAYS_IN_WORK_AREA: stays_in_work_area(direction_W, P, table, validity.d_push),
+        Criterion.NOT_IN_VAIN: np.isfinite(cost),
+    }
     tallest = float(table.height.max())
     cluster_W = table.points(P)
     length = validity.clearance + validity.d_push
     pushes = []
-    for n in np.flatnonzero(possible):
+    for n in np.flatnonzero(np.all(list(passed.values()), axis=0)):
         b_W, ahead_W, tip = contacts.b_W[n], direction_W[n], float(contacts.tip_height[n])
         start_W = b_W - (validity.clearance + pusher.thickness / 2) * ahead_W
         ground = float(table.ground(b_W + np.outer([-1, 1], length * ahead_W)).max())
@@ -160,7 +216,7 @@ def valid_pushes(
                 cost=float(cost[n]),
             )
         )
-    return pushes
+    return pushes, {criterion: ~passes for criterion, passes in passed.items()}
 
 
 def stays_in_work_area(

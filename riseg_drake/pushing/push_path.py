@@ -1,16 +1,19 @@
 """The arm's way for one push: over the things, down, forward, and back the way it came.
 
-The tool stays upright all along, so the camera keeps looking straight down on the scene. The way back
+The tool is upright whenever it is low, so that the camera looks straight down on what is pushed; where the
+observation posture holds it at an angle, it is set upright on the way over the things. The way back
 retraces the way there in joint space: it needs no planning, ends exactly where it began, and leads
 through space that was found free.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.trajectories import PiecewisePolynomial
+from scipy.spatial.transform import Rotation
 
+from riseg_drake.pushing.decision import PathStage
 from riseg_drake.pushing.push import ArmPhase, Push
 from riseg_drake.pushing.pusher import Pusher
 from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest, steady_speed
@@ -71,7 +74,8 @@ class PushPathParameters:
     joint_step: float = 0.25
     """No joint may turn more than this between two of those poses, rad: beyond, it would be a leap."""
     min_clearance: float = MIN_CLEARANCE
-    """Room that arm, pusher and camera keep to the table and to each other, m."""
+    """Room that arm, pusher and camera keep to the table and to each other, m; half the tip's height where that
+    is less, so that low things can be pushed."""
 
 
 @dataclass(frozen=True)
@@ -108,39 +112,40 @@ def plan_push_path(
     q_observe: NDArray,
     pusher: Pusher,
     parameters: PushPathParameters | None = None,
-) -> PushPath | None:
-    """The path of a push from the posture q_observe [7] and back to it; None where the arm cannot do it.
+) -> PushPath | PathStage:
+    """The path of a push from the posture q_observe [7] and back to it, or what the arm cannot do of it.
 
     Joint limits, table, and the arm's own parts are looked at along all of it. Objects need no look:
     what the bar sweeps at their height was found free on the map, and the rest goes on above them.
     """
     parameters = parameters or PushPathParameters()
     if push.tallest > pusher.length - parameters.arm_room:
-        return None
+        return PathStage.ROOM_BELOW_THE_FLANGE
     ahead_W = np.append(push.direction_W, 0.0)
     yaw = float(np.arctan2(push.direction_W[1], push.direction_W[0]))
     ground = push.p_WE[2] - push.tip_height
     crossing = max(ground + push.tallest + parameters.crossing_height, push.p_WE[2])
-    above_W = np.append(push.p_WE[:2], crossing)
-
-    reached_W = push.p_WE + push.length * ahead_W
+    X_WStart = tip_pointing_down(push.p_WE, yaw)
+    X_WAbove = tip_pointing_down(np.append(push.p_WE[:2], crossing), yaw)
+    X_WReached = tip_pointing_down(push.p_WE + push.length * ahead_W, yaw)
     # From the push outwards: the posture for it is chosen first, the rest has to lead there.
-    q_start = kinematics.solve_ik(
-        tip_pointing_down(push.p_WE, yaw), q_observe, min_clearance=parameters.min_clearance
-    )
+    low = replace(parameters, min_clearance=min(parameters.min_clearance, push.tip_height / 2))
+    q_start = kinematics.solve_ik(X_WStart, q_observe, min_clearance=low.min_clearance)
     if q_start is None:
-        return None
-    stroke = _trace(_straight(push.p_WE, reached_W, yaw, yaw, parameters), q_start, kinematics, parameters)
-    climb = _trace(_straight(push.p_WE, above_W, yaw, yaw, parameters), q_start, kinematics, parameters)
-    if stroke is None or climb is None:
-        return None
+        return PathStage.POSTURE
+    stroke = _trace(_between(X_WStart, X_WReached, 0.0, low), q_start, kinematics, low)
+    if stroke is None:
+        return PathStage.STROKE
+    climb = _trace(_between(X_WStart, X_WAbove, 0.0, low), q_start, kinematics, low)
+    if climb is None:
+        return PathStage.DESCENT
     legs = _crossing(q_observe, climb[-1], crossing, kinematics, parameters)
     if legs is None:
-        return None
+        return PathStage.CROSSING
     limits = parameters.limits.limits()
     path = _in_time([*legs, climb[::-1], stroke], push.length, limits, kinematics.limits, parameters)
     longest = LONGEST * max(limits.slowness, 1.0) if parameters.longest is None else parameters.longest
-    return path if path.duration <= longest else None
+    return path if path.duration <= longest else PathStage.DURATION
 
 
 def _crossing(
@@ -154,37 +159,54 @@ def _crossing(
     or higher; None where the arm cannot follow.
     """
     q_from, legs = np.asarray(q_observe, float), []
-    p_WE, yaw = _tip(kinematics, q_from)
-    if p_WE[2] < height:  # up first, where it stands
-        raised_W = np.append(p_WE[:2], height)
-        rise = _trace(_straight(p_WE, raised_W, yaw, yaw, parameters), q_from, kinematics, parameters)
+    X_WE = kinematics.X_WE(q_from)
+    if X_WE[2, 3] < height:  # up first, as it stands
+        X_WRaised = X_WE.copy()
+        X_WRaised[2, 3] = height
+        rise = _trace(_between(X_WE, X_WRaised, 0.0, parameters), q_from, kinematics, parameters)
         if rise is None:
             return None
         legs.append(rise)
-        q_from, p_WE = rise[-1], raised_W
+        q_from, X_WE = rise[-1], X_WRaised
     # The same direction can be reached turning left or right; the joints' own way there tells which.
     way = q_from + np.linspace(0, 1, 13)[:, None] * (q_above - q_from)
-    turn = float(np.diff(np.unwrap([_tip(kinematics, q)[1] for q in way])).sum())
-    above_W, _ = _tip(kinematics, q_above)
-    poses = _straight(p_WE, above_W, yaw, yaw + turn, parameters)
+    turn = float(np.diff(np.unwrap([_yaw(kinematics.X_WE(q)) for q in way])).sum())
+    poses = _between(X_WE, kinematics.X_WE(q_above), turn, parameters)
     crossing = _lead(poses, q_from, q_above, kinematics, parameters)
     return None if crossing is None else [*legs, crossing]
 
 
-def _straight(
-    from_W: NDArray, to_W: NDArray, from_yaw: float, to_yaw: float, parameters: PushPathParameters
+def _between(
+    X_WE0: NDArray, X_WE1: NDArray, turn: float, parameters: PushPathParameters
 ) -> list[NDArray[np.float64]]:
-    """Poses X_WE on a straight way with the tool upright, without the first."""
+    """Poses X_WE on a straight way, without the first, while the tool turns by `turn`, rad, about the
+    vertical and what it leans changes steadily.
+    """
+    p_WE0, p_WE1 = X_WE0[:3, 3], X_WE1[:3, 3]
+    yaw = _yaw(X_WE0)
+    lean, end_lean = (_lean(X_WE, at) for X_WE, at in ((X_WE0, yaw), (X_WE1, yaw + turn)))
     steps = max(
-        float(np.linalg.norm(to_W - from_W)) / parameters.position_step,
-        abs(to_yaw - from_yaw) / parameters.angle_step,
+        float(np.linalg.norm(p_WE1 - p_WE0)) / parameters.position_step,
+        (abs(turn) + float(np.linalg.norm(end_lean - lean))) / parameters.angle_step,
         3,
     )
-    shares = np.linspace(0, 1, int(np.ceil(steps)) + 1)[1:]
-    return [
-        tip_pointing_down(from_W + share * (to_W - from_W), from_yaw + share * (to_yaw - from_yaw))
-        for share in shares
-    ]
+    poses = []
+    for share in np.linspace(0, 1, int(np.ceil(steps)) + 1)[1:]:
+        X_WE = tip_pointing_down(p_WE0 + share * (p_WE1 - p_WE0), yaw + share * turn)
+        X_WE[:3, :3] @= Rotation.from_rotvec(lean + share * (end_lean - lean)).as_matrix()
+        poses.append(X_WE)
+    return poses
+
+
+def _lean(X_WE: NDArray, yaw: float) -> NDArray[np.float64]:
+    """The rotation vector [3], in E, from the upright tool at a yaw to the tool at X_WE."""
+    upright = tip_pointing_down(X_WE[:3, 3], yaw)[:3, :3]
+    return Rotation.from_matrix(upright.T @ X_WE[:3, :3]).as_rotvec()
+
+
+def _yaw(X_WE: NDArray) -> float:
+    """The direction of E's x axis about W's z, rad."""
+    return float(np.arctan2(X_WE[1, 0], X_WE[0, 0]))
 
 
 def _trace(
@@ -231,12 +253,6 @@ def _nearest_posture(X_WE: NDArray, q: NDArray, kinematics: PandaKinematics) -> 
             return q
         q = q + np.linalg.lstsq(kinematics.tip_jacobian(q), error, rcond=1e-4)[0]
     return None
-
-
-def _tip(kinematics: PandaKinematics, q: NDArray) -> tuple[NDArray[np.float64], float]:
-    """p_WE [3] and the yaw of E's x axis at q [7]."""
-    X_WE = kinematics.X_WE(q)
-    return X_WE[:3, 3], float(np.arctan2(X_WE[1, 0], X_WE[0, 0]))
 
 
 def _in_time(

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.pushing.decision import Decision, PathStage
 from riseg_drake.pushing.find_action import FindActionParameters, find_action
 from riseg_drake.pushing.push import Push
 from riseg_drake.pushing.push_path import PushPath, PushPathParameters, plan_push_path
@@ -34,8 +35,8 @@ def plan_push(
     rng: np.random.Generator,
     tried: Sequence[TriedPush] = (),
     parameters: PushPlanningParameters | None = None,
-) -> Push | None:
-    """The next push, with a path from the posture q_observe [7] and back; None when there is none.
+) -> Decision:
+    """The next push, with a path from the posture q_observe [7] and back, or why there is none.
 
     Args:
         frame: what the camera saw from that posture.
@@ -63,7 +64,7 @@ def plan_push(
     )
     ahead_W = kinematics.X_WE(q_observe)[:2, 0]
 
-    def path_of(push: Push) -> PushPath | None:
+    def path_of(push: Push) -> PushPath | PathStage:
         return plan_push_path(push, kinematics, q_observe, parameters.action.pusher, parameters.path)
 
     return find_action(

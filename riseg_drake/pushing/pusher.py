@@ -17,8 +17,9 @@ class Pusher:
     """Room that must be left around the bar, m."""
     tip_height: float = 0.008
     """Height of the end face above the table during a push, m, unless the object is too low for it."""
-    lowest_tip_height: float = 0.004
-    """The end face never goes below this height, m: plane fit, arm and table have their errors."""
+    lowest_tip_height: float = 0.002
+    """The end face never goes below this height, m: plane fit, arm and table have their errors. Nothing lower
+    than this over `height_share` is pushed (4.4 mm)."""
     height_share: float = 0.45
     """The end face is at most at this share of the object's height where it is touched, so that even
     something round is met at or below its widest level."""

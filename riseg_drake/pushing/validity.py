@@ -44,17 +44,6 @@ class Validity:
         """[N], the paper's IsValidPush."""
         return self.center_on_object & self.accessible & self.moves_alone
 
-    def why_not(self, candidate: int) -> str | None:
-        """The first criterion that a candidate fails, in words; None if it is valid."""
-        if not self.center_on_object[candidate]:
-            return "the cluster's center does not lie on an object"
-        if not self.accessible[candidate]:
-            return "the area that the end effector needs is not free"
-        if not self.moves_alone[candidate]:
-            share = self.overlap[candidate]
-            return f"{share:.0%} of the cluster would be pushed onto other objects"
-        return None
-
 
 def is_valid_push(
     b_W: NDArray,

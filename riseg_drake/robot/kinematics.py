@@ -17,6 +17,8 @@ LIMIT_MARGIN = 0.05
 """Room that solutions keep to the ends of the joints' ranges, rad."""
 MIN_CLEARANCE = 0.003
 """Room that solutions keep between arm, tool and table, m."""
+OBSERVING_CLEARANCE = 0.02
+"""The same where the arm looks at the scene from an angle, m."""
 
 READY = np.array([0.0, -0.1, 0.0, -2.4, 0.0, 2.3, 0.0])
 """An elbow-up posture amid the joints' ranges, tool pointing down, rad; where a search starts."""
@@ -193,29 +195,39 @@ def pose_error(X_WA: NDArray, X_WB: NDArray) -> NDArray[np.float64]:
 
 
 def observe_pose(
-    p_WT: Sequence[float] | NDArray, height: float, X_EC: NDArray, yaw: float = 0.0
+    p_WT: Sequence[float] | NDArray, distance: float, X_EC: NDArray, yaw: float = 0.0, pitch: float = 0.0
 ) -> NDArray[np.float64]:
-    """X_WE [4, 4] with the camera looking straight down at p_WT [3] from `height` m above it.
+    """X_WE [4, 4] with the camera looking at p_WT [3] from `distance` m, straight down with pitch 0.
 
     `yaw` is the direction of the image's upper edge about W's z axis; 0 is away from the robot, so that
-    the pusher stands on the robot's side of what is looked at.
+    the pusher stands on the robot's side of what is looked at. `pitch`, rad, turns the camera about the
+    image's horizontal axis, so that it looks more towards where the upper edge was.
     """
     X_WE = tip_pointing_down(np.zeros(3), yaw)
-    p_EC_W = X_WE[:3, :3] @ X_EC[:3, 3]
-    X_WE[:3, 3] = np.add(p_WT, [0, 0, height]) - p_EC_W
+    s, c = np.sin(pitch), np.cos(pitch)
+    X_WE[:3, :3] @= np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])  # E's y is the image's horizontal axis
+    R_WC = X_WE[:3, :3] @ X_EC[:3, :3]
+    X_WE[:3, 3] = np.asarray(p_WT) - distance * R_WC[:, 2] - X_WE[:3, :3] @ X_EC[:3, 3]
     return X_WE
 
 
 def observation_posture(
-    kinematics: PandaKinematics, centre_W: Sequence[float], height: float, given: Sequence[float] = ()
+    kinematics: PandaKinematics,
+    centre_W: Sequence[float],
+    height: float,
+    given: Sequence[float] = (),
+    pitch: float = 0.0,
 ) -> NDArray[np.float64]:
-    """Joint angles [7], rad, to look from: those given, or looking straight down at a point of the table.
+    """Joint angles [7], rad, to look from: those given, or looking at a point of the table.
+
+    Where the view leans, the camera looks from that side of the point where the arm has most room to move.
 
     Args:
         kinematics: of the arm.
         centre_W: the point's x and y in W, m.
-        height: of the camera above it, m.
+        height: of the camera above it, m; where the view leans its distance.
         given: joint angles, rad, to be used instead; may be empty.
+        pitch: how far the view leans from straight down, rad.
 
     Raises:
         ValueError: these are not seven, or the arm cannot look from there.
@@ -224,10 +236,38 @@ def observation_posture(
         if len(given) != 7:
             raise ValueError(f"start_position: {len(given)} angles; expected 7, in rad")
         return np.array(given, np.float64)
-    q = kinematics.solve_ik(observe_pose([*centre_W, 0.0], height, kinematics.X_EC))
+    p_WT = [*centre_W, 0.0]
+    if pitch:
+        q = _roomiest(kinematics, p_WT, height, abs(pitch))
+        leaning = f" leaning by observe_pitch: {pitch} rad"
+    else:
+        q = kinematics.solve_ik(observe_pose(p_WT, height, kinematics.X_EC))
+        leaning = ""
     if q is None:
         raise ValueError(
-            f"observe_height: no posture looks at {list(centre_W)} from {height} "
-            "m; 0.5 m above (0.5, 0) is within reach"
+            f"observe_height: no posture looks at {list(centre_W)} from {height} m{leaning}; "
+            "0.5 m above (0.5, 0) is within reach"
         )
     return q
+
+
+def _roomiest(
+    kinematics: PandaKinematics, p_WT: Sequence[float], distance: float, pitch: float
+) -> NDArray[np.float64] | None:
+    """The posture [7] with the view leaning by `pitch` that is furthest from the joints' limits; None: none.
+
+    Looked for all around the point, in steps of 15 degrees from where the image's upper edge is away from
+    the robot, with the camera on either side of the pusher.
+    """
+    best, best_room = None, 0.0
+    for turn in sorted(np.arange(-11, 13) * np.pi / 12, key=abs):
+        for lean in (pitch, -pitch):
+            q = kinematics.postures(observe_pose(p_WT, distance, kinematics.X_EC, turn, lean))
+            room = kinematics.limits.room(q).min(axis=1)
+            for i in np.argsort(-room):
+                if room[i] < best_room + 1e-6:  # mirrored postures have equal room: the first is taken
+                    break
+                if kinematics.clearance(q[i]) >= OBSERVING_CLEARANCE:
+                    best, best_room = q[i], room[i]
+                    break
+    return best

@@ -99,11 +99,13 @@ class HardwareStationConfig:
     centre_W: list[float] = field(
         default_factory=lambda: [0.5, 0.0], metadata={"sizes": (2,), "least": -1.5, "most": 1.5}
     )
-    """Middle of the work area on the table, x and y in W, m; the camera looks down at it between pushes."""
+    """Middle of the work area on the table, x and y in W, m; the camera looks at it between pushes."""
     observe_height: float = field(default=0.5, metadata={"least": 0.1, "most": 1.5})
-    """Height of the camera above it then, m."""
+    """Distance of the camera from it then, m: its height, where it looks straight down."""
+    observe_pitch: float = field(default=0.0, metadata={"least": 0.0, "most": 1.2})
+    """How far the view leans from straight down then, rad, from the side where the arm has most room."""
     start_position: list[float] = field(default_factory=list, metadata={"sizes": (0, 7)})
-    """Joint angles to look from instead, rad, 7; empty: as the two lines above say."""
+    """Joint angles to look from instead, rad, 7; empty: as the lines above say."""
 
     def check(self) -> None:
         """Raise ValueError for what this robot cannot do."""

@@ -98,9 +98,13 @@ class SimulatedStationConfig:
     damping: float = 200.0
     """Derivative gain of every joint's controller, N m s / rad."""
     start_position: list[float] = field(default_factory=list, metadata={"sizes": (0, 7)})
-    """Joint angles at the start, rad, 7; empty: looking straight down at the middle of the work area."""
+    """Joint angles at the start, rad, 7; empty: looking at the middle of the work area."""
     observe_height: float = 0.5
-    """Height of the camera above the table at the start, m; unused where start_position is given."""
+    """Distance of the camera from there at the start, m: its height, where it looks straight down. Unused
+    where start_position is given."""
+    observe_pitch: float = 0.0
+    """How far the view leans from straight down at the start, rad (0.785 is 45 degrees), from the side where
+    the arm has most room. Unused where start_position is given."""
 
     def check(self) -> None:
         """Raise ValueError for joint angles that the robot does not have."""
@@ -245,7 +249,11 @@ def start_position(config: SimulatedStationConfig) -> list[float]:
     """Joint angles at the start, rad [7]. Raises ValueError where the arm cannot look from there."""
     return list(
         observation_posture(
-            PandaKinematics(config.panda), config.scene.centre_W, config.observe_height, config.start_position
+            PandaKinematics(config.panda),
+            config.scene.centre_W,
+            config.observe_height,
+            config.start_position,
+            config.observe_pitch,
         )
     )
 

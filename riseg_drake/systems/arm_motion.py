@@ -12,6 +12,7 @@ from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSys
 from pydrake.trajectories import PiecewisePolynomial
 
 from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR, FramePair, Immutable
+from riseg_drake.pushing.decision import UNDECIDED, Decision, Ending
 from riseg_drake.pushing.push import NO_PUSH, ArmPhase, Push
 from riseg_drake.pushing.time_law import minimum_jerk
 from riseg_drake.pushing.tried_pushes import SegmentedSoFar, TriedPush, segmented_so_far
@@ -73,8 +74,10 @@ class _Memory(Immutable):
     unjudged: Push = NO_PUSH
     """A push that is over but of which it is not known yet what it brought."""
     tried: tuple[TriedPush, ...] = ()
+    decision: Decision = UNDECIDED
+    """What was decided last, ..."""
     asked: int = -1
-    """The last frame in which a push was looked for."""
+    """... and in which frame."""
     nulls: int = 0
     done: bool = False
 
@@ -88,8 +91,9 @@ class ArmMotion(LeafSystem):
     """Turns pushes into joint angles, and asks for the next push when it is time.
 
     Inputs:
-        push: Push with a path, or NO_PUSH; evaluated only when the arm rests and sees, once for a frame.
-        pair: FramePair; tells when the frame was taken that push and mask belong to.
+        decision: Decision, a Push with a path or why there is none; evaluated only when the arm rests and
+            sees, once for a frame.
+        pair: FramePair; tells when the frame was taken that decision and mask belong to.
         mask: L_t of the pair's current frame, to tell whether a push brought anything.
         position_measured: the arm's joint angles [7], rad.
 
@@ -100,6 +104,8 @@ class ArmMotion(LeafSystem):
         interaction_step: int, how many pushes are over.
         active_push: the Push that is being done, or waits for permission, or NO_PUSH.
         tried_pushes: tuple of TriedPush.
+        last_decision: the Decision that was made last, with the arm done why there is no push any more;
+            where the operator ended it that still has its push.
 
     `permit` is asked about every push, again and again while it says WAIT; without it each is done.
     `done_until` tells up to what time, s, the commanded positions have been gone through, where that may be
@@ -126,7 +132,7 @@ class ArmMotion(LeafSystem):
         self._permit = permit
         self._done_until = done_until
         self._way_back = way_back
-        self._push = self.DeclareAbstractInputPort("push", AbstractValue.Make(NO_PUSH))
+        self._decision = self.DeclareAbstractInputPort("decision", AbstractValue.Make(UNDECIDED))
         self._pair = self.DeclareAbstractInputPort("pair", AbstractValue.Make(NO_PAIR))
         self._mask = self.DeclareAbstractInputPort("mask", AbstractValue.Make(NO_MASK))
         self._measured = self.DeclareVectorInputPort("position_measured", 7)
@@ -138,6 +144,7 @@ class ArmMotion(LeafSystem):
         self._declare("interaction_step", 0, lambda m, t: m.interaction_step, state)
         self._declare("active_push", NO_PUSH, lambda m, t: m.active_push, state)
         self._declare("tried_pushes", (), lambda m, t: m.tried, state)
+        self._declare("last_decision", UNDECIDED, lambda m, t: m.decision, state)
         self.DeclarePeriodicUnrestrictedUpdateEvent(self._parameters.period, 0.0, self._update)
 
     def _declare(self, name: str, model: Any, read: Any, prerequisites: set) -> None:
@@ -200,23 +207,18 @@ class ArmMotion(LeafSystem):
             return memory
         if memory.unjudged is not NO_PUSH:
             return self._judge(memory, pair, context)
-        if memory.interaction_step >= parameters.most_interactions:
-            return replace(memory, done=True)
         if memory.asked == pair.current.sequence:
             return memory
 
-        push: Push = self._push.Eval(context)
-        if push is NO_PUSH:
+        decision: Decision = self._decision.Eval(context)
+        memory = replace(memory, decision=decision, asked=pair.current.sequence)
+        if memory.interaction_step >= parameters.most_interactions:
+            return replace(memory, decision=_enough(decision), done=True)
+        if decision.push is NO_PUSH:
             nulls = memory.nulls + 1
-            return replace(
-                memory, asked=pair.current.sequence, nulls=nulls, done=nulls >= parameters.null_frames
-            )
+            return replace(memory, nulls=nulls, done=nulls >= parameters.null_frames)
         proposal = replace(
-            memory,
-            proposed=push,
-            asked=pair.current.sequence,
-            nulls=0,
-            segmented_before=self._segmented(pair, context),
+            memory, proposed=decision.push, nulls=0, segmented_before=self._segmented(pair, context)
         )
         return self._ask(proposal, time)
 
@@ -277,3 +279,10 @@ class ArmMotion(LeafSystem):
                 f"posture, at most {self._parameters.largest_jump} is allowed; plan from `position`"
             )
         return offset
+
+
+def _enough(decision: Decision) -> Decision:
+    """The decision that stands once as many pushes as may be were made."""
+    if decision.ending is Ending.NOTHING_LEFT:
+        return decision
+    return Decision(ending=Ending.ENOUGH_INTERACTIONS, unsettled_area=decision.unsettled_area)

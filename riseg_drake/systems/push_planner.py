@@ -5,7 +5,7 @@ from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, LeafSystem
 
 from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR, FramePair
-from riseg_drake.pushing.push import NO_PUSH
+from riseg_drake.pushing.decision import UNDECIDED
 from riseg_drake.pushing.push_planning import PushPlanningParameters, plan_push
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
@@ -24,10 +24,10 @@ class PushPlanner(LeafSystem):
         tried_pushes: tuple of TriedPush; may be left unconnected.
 
     Outputs:
-        push: Push with its path; NO_PUSH when everything is segmented, no valid push exists, or no
-            frame has come yet.
+        decision: Decision, a Push with its path or the reason why there is none; UNDECIDED where no frame
+            has come yet.
 
-    The same inputs give the same push: the clustering's random numbers come from the seed and the
+    The same inputs give the same decision: the clustering's random numbers come from the seed and the
     frame's sequence number.
     """
 
@@ -50,21 +50,21 @@ class PushPlanner(LeafSystem):
         self._position = self.DeclareVectorInputPort("position", 7)
         self._tried = self.DeclareAbstractInputPort("tried_pushes", AbstractValue.Make(()))
         self.DeclareAbstractOutputPort(
-            "push",
-            alloc=AbstractValue.Make(NO_PUSH).Clone,
-            calc=self._calc_push,
+            "decision",
+            alloc=AbstractValue.Make(UNDECIDED).Clone,
+            calc=self._calc_decision,
             prerequisites_of_calc={self.all_input_ports_ticket()},
         )
 
     @timed
-    def _calc_push(self, context: Context, output: AbstractValue) -> None:
+    def _calc_decision(self, context: Context, output: AbstractValue) -> None:
         pair: FramePair = self._pair.Eval(context)
         if pair is NO_PAIR:
-            output.set_value(NO_PUSH)
+            output.set_value(UNDECIDED)
             return
         above_table = self._above_table.Eval(context)
         frame = pair.current
-        push = plan_push(
+        decision = plan_push(
             frame,
             above_table.mask,
             above_table.height,
@@ -76,4 +76,4 @@ class PushPlanner(LeafSystem):
             self._tried.Eval(context) if self._tried.HasValue(context) else (),
             self._parameters,
         )
-        output.set_value(push or NO_PUSH)
+        output.set_value(decision)

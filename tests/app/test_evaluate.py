@@ -13,6 +13,7 @@ from riseg_drake.app.output import OutputError, RunFolder, Step
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.scene_folder import is_finished, read_result
 from riseg_drake.app.scene_pool import cluster_pool, local_pool
+from riseg_drake.evaluation.in_motion import InMotion
 from riseg_drake.evaluation.scores import score
 
 LAST_STEP = 2
@@ -31,9 +32,19 @@ def fake_run(scenario, seed, folder, record=False):
         mask = ground_truth if i else np.zeros_like(ground_truth)
         color, depth = np.zeros((48, 64, 3), np.uint8), np.full((48, 64), 0.5, np.float32)
         folder.write_step(
-            Step(i, 0.1 * i, color, depth, mask, 1, ground_truth=ground_truth, scores=score(mask, ground_truth))
+            Step(
+                i,
+                0.1 * i,
+                color,
+                depth,
+                mask,
+                1,
+                ground_truth=ground_truth,
+                scores=score(mask, ground_truth),
+                in_motion=InMotion(12, 0.75, 0.5) if i else None,
+            )
         )
-    folder.note(state="done", end="no push is left")
+    folder.note(state="done", end="no push is left", ended="no_path", unsettled_area_m2=0.002)
 
 
 @pytest.fixture
@@ -76,6 +87,15 @@ def test_scene_k_has_the_seed_s_plus_k_and_a_folder_of_its_own(tmp_path, scenes_
     content = summary(tmp_path)
     assert content["state"] == "done"
     assert [step["mean"]["Objects F-measure"] for step in content["methods"]["riseg_drake"]] == [0, 1, 1]
+
+
+def test_the_summary_says_how_runs_ended_and_how_good_masks_were_in_motion(tmp_path, scenes_run):
+    evaluate(tasks(tmp_path, 2), local_pool(1), LAST_STEP, QUIET)
+    content = summary(tmp_path)
+    assert content["ended"] == {"no_path": 2}
+    assert [(run["ended"], run["unsettled_area_m2"]) for run in content["runs"]] == [("no_path", 0.002)] * 2
+    assert content["in_motion"]["all"] == {"scenes": 2, "frames": 24, "overlap_f": 0.75, "at_rest_f": 0.5}
+    assert content["in_motion"]["interactions"][1] == {"scenes": 0}
 
 
 def test_what_is_finished_is_not_run_again(tmp_path, scenes_run):

@@ -37,7 +37,7 @@ def test_the_built_in_scenario_of_a_robot_can_stop_in_time_and_is_wired_by_the_s
     scenario = load_scenario(None, HARDWARE)
     check_limits(scenario)
     names = port_names(make_diagram(scenario, seed=0).diagram)
-    assert {"wrist.color_image", "panda.position_measured", "mask", "push", "phase"} <= names
+    assert {"wrist.color_image", "panda.position_measured", "mask", "decision", "phase"} <= names
     assert not [name for name in names if name.startswith("cheat.")]
 
 

@@ -7,6 +7,7 @@ import pytest
 from riseg_drake.app import bench
 from riseg_drake.app import run as run_module
 from riseg_drake.app.cli import main
+from riseg_drake.evaluation.in_motion import overlap_f_of
 from riseg_drake.evaluation.scores import score
 from riseg_drake.recording.reader import RecordingReader
 from riseg_drake.robot.kinematics import PandaKinematics
@@ -35,9 +36,23 @@ def test_a_run_ends_by_itself_and_leaves_a_step_for_every_interaction(finished):
     assert content["state"] == "done"
     assert content["seed"] == 1
     assert [step["step"] for step in content["steps"]] == [0, 1]
+    assert content["ended"] == "enough_interactions"
     for i in (0, 1):
         names = {path.name for path in (finished / f"step_{i}").iterdir()}
         assert names == {"color.png", "depth.png", "mask.png", "overlay.png", "ground_truth.png"}
+
+
+def test_the_area_that_is_left_at_the_end_is_that_of_what_is_not_segmented(finished):
+    # Seen from straight above at 0.5 m: one of two toys, as the last step's pictures have it.
+    content = summary(finished)
+    depth, mask, truth = (
+        read(finished / "step_1" / f"{name}.png") for name in ("depth", "mask", "ground_truth")
+    )
+    left = (truth > 0) & (mask == 0)
+    area = np.sum((depth[left] / 1e3) ** 2) / (308.1 * 307.9)
+    assert area > 1e-3
+    assert content["unsettled_area_m2"] == pytest.approx(area, rel=0.2)
+    assert f"1 of 1 interactions were made, {1e4 * content['unsettled_area_m2']:.0f} cm^2" in content["end"]
 
 
 def test_before_the_first_push_the_mask_is_empty(finished):
@@ -55,6 +70,27 @@ def test_the_scores_of_the_summary_are_those_of_the_written_images(finished):
         folder = finished / f"step_{entry['step']}"
         written = score(read(folder / "mask.png"), read(folder / "ground_truth.png"))
         assert entry["scores"] == pytest.approx(written.as_dict())
+
+
+def test_masks_while_things_move_are_scored_in_every_frame_from_one_centimetre_on(finished):
+    content = summary(finished)
+    assert "in_motion" not in content["steps"][0]
+    figures = content["steps"][1]["in_motion"]
+    assert figures == content["in_motion"]
+    frames = list(RecordingReader(finished / "recording"))
+    moved = {name for name, motion in content["steps"][1]["motions"].items() if motion["moved_m"] >= 0.01}
+    assert moved
+    # The push takes 1.75 s of some 6 s; 1 cm is reached within it, and the way back is another 2 to 3 s.
+    between = [f for f in frames if f.time <= content["steps"][1]["time_s"]]
+    assert 0.15 * len(between) < figures["frames"] < 0.8 * len(between)
+    assert 0.5 < figures["overlap_f"] <= 1.0
+    assert figures["at_rest_f"] == pytest.approx(
+        overlap_f_of(
+            {int(i) for i, name in content["objects"].items() if name in moved},
+            read(finished / "step_1" / "mask.png"),
+            read(finished / "step_1" / "ground_truth.png"),
+        )
+    )
 
 
 def test_every_stage_is_evaluated_once_a_frame(finished):

@@ -39,7 +39,7 @@ def test_the_recording_of_a_real_robot_is_segmented_as_it_was_seen(tmp_path):
     wired = SimpleNamespace(intrinsics=SMALL, position=lambda context: READY)
 
     def truth(frame, context):
-        return Truth(frames[1].labels, {}, {}) if frame.time == frames[1].time else None
+        return Truth(lambda: frames[1].labels, {}, {}) if frame.time == frames[1].time else None
 
     with recording_of(wired, scenario, 7, truth, tmp_path) as record:
         for k, seen in enumerate(frames):

@@ -5,6 +5,7 @@ import pytest
 
 from riseg_drake.evaluation.disturbance import Disturbance, ObjectMotion
 from riseg_drake.evaluation.figure import draw_figure
+from riseg_drake.evaluation.in_motion import InMotion
 from riseg_drake.evaluation.published import PUBLISHED
 from riseg_drake.evaluation.report import report_text
 from riseg_drake.evaluation.scene_result import SceneResult
@@ -25,11 +26,21 @@ GOOD = SceneResult(
         Disturbance("a", {"a": ObjectMotion(0.02, 0, 1.0), "b": ObjectMotion(0.001, 0, 0)}),
         Disturbance("a", {"a": ObjectMotion(0.01, 0, 1.5), "b": ObjectMotion(0.003, 0, 0)}),
     ],
+    ended="nothing_valid",
+    unsettled_area_m2=0.0040,
+    in_motion=[InMotion(10, 0.8, 0.9), None],
     baselines={"depth clusters": scores(0.7, 0.7, 0.6)},
     ablation={"no memory": scores(0.0, 0.5, 0.8)},
 )
 FAILED = SceneResult(name="scene_001", seed=101, failure="the table broke", end="the table broke")
-BETTER = replace(GOOD, name="scene_002", seed=102, ablation={"no memory": scores(0.0, 0.5, 0.6)})
+BETTER = replace(
+    GOOD,
+    name="scene_002",
+    seed=102,
+    unsettled_area_m2=0.0010,
+    in_motion=[InMotion(30, 0.6, 0.7), InMotion(10, 1.0, 0.9)],
+    ablation={"no memory": scores(0.0, 0.5, 0.6)},
+)
 
 
 @pytest.fixture(scope="module")
@@ -69,9 +80,22 @@ def test_the_worst_scene_comes_first(text):
 
 
 def test_what_the_pushes_did_is_in_the_report(text):
-    assert rows(text, "1")[0] == ["2", "2.00", "1.00", "1.0", "0", "0"]
-    assert rows(text, "3")[0] == ["0", "–", "–", "–", "0", "0"]
-    assert rows(text, "**all**")[0] == ["4", "1.50", "2.00", "1.5", "0", "0"]
+    assert rows(text, "1")[1] == ["2", "2.00", "1.00", "1.0", "0", "0"]
+    assert rows(text, "3")[1] == ["0", "–", "–", "–", "0", "0"]
+    assert rows(text, "**all**")[1] == ["4", "1.50", "2.00", "1.5", "0", "0"]
+
+
+def test_masks_while_things_move_are_in_the_report(text):
+    assert rows(text, "1")[0] == ["2", "40", "70.0", "80.0"]
+    assert rows(text, "2")[0] == ["1", "10", "100.0", "90.0"]
+    assert rows(text, "3")[0] == ["0", "0", "–", "–"]
+    # Scenes weigh alike: 80, and (30 * 60 + 10 * 100) / 40 = 70.
+    assert rows(text, "**all**")[0] == ["2", "50", "75.0", "82.5"]
+    assert rows(text, "[scene_002](scene_002/step_2/overlay.png)")[0][-2:] == ["70.0", "no push is left"]
+
+
+def test_how_the_runs_ended_is_counted_with_what_was_left(text):
+    assert rows(text, "nothing_valid") == [["2", "25.0", "40.0"]]
 
 
 def test_a_switch_is_compared_scene_by_scene():

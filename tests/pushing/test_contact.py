@@ -26,7 +26,9 @@ def test_bar_meets_a_face_with_all_its_width(drawn):
     assert contact.face[0] > 0.95
 
 
-@pytest.mark.parametrize(("height", "tip"), [(0.10, 0.008), (0.015, 0.00675), (0.010, 0.0045)])
+@pytest.mark.parametrize(
+    ("height", "tip"), [(0.10, 0.008), (0.015, 0.00675), (0.010, 0.0045), (0.005, 0.00225)]
+)
 def test_tip_is_below_the_middle_of_low_objects(drawn, height, tip):
     drawn.box(0.52, 0.0, 0.04, 0.04, height=height)
     contact = contact_of(drawn, drawn.objects.copy(), [0.5, 0.0])
@@ -35,7 +37,7 @@ def test_tip_is_below_the_middle_of_low_objects(drawn, height, tip):
 
 
 def test_thing_too_low_for_the_bar_is_not_touched(drawn):
-    drawn.box(0.52, 0.0, 0.04, 0.04, height=0.006)
+    drawn.box(0.52, 0.0, 0.04, 0.04, height=0.004)
     assert not contact_of(drawn, drawn.objects.copy(), [0.5, 0.0]).high_enough[0]
 
 

@@ -1,12 +1,20 @@
 import numpy as np
 import pytest
 
+from riseg_drake.pushing.decision import Criterion, Ending, PathStage
 from riseg_drake.pushing.find_action import FindActionParameters, find_action
+from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.pushing.tried_pushes import TriedPush
 
 
-def act(table, seed=0, **options):
+def decide(table, seed=0, **options):
     return find_action(table, np.random.default_rng(seed), **options)
+
+
+def act(table, seed=0, **options):
+    """The push, or None."""
+    push = decide(table, seed, **options).push
+    return None if push is NO_PUSH else push
 
 
 def cluttered(drawn):
@@ -14,22 +22,58 @@ def cluttered(drawn):
     return drawn.box(0.52, -0.02, 0.05, 0.05, yaw=0.8).disc(0.45, -0.08, 0.03)
 
 
-def test_segmented_scene_is_null(drawn):
-    table = drawn.box(0.5, 0.0, 0.05, 0.05, segmented=True).map()
-    assert act(table) is None
+def test_segmented_scene_is_null_because_nothing_is_left(drawn):
+    decision = decide(drawn.box(0.5, 0.0, 0.05, 0.05, segmented=True).map())
+    assert decision.push is NO_PUSH
+    assert decision.ending is Ending.NOTHING_LEFT
+    assert decision.unsettled_area == 0.0
 
 
-def test_empty_table_is_null(drawn):
-    assert act(drawn.map()) is None
+def test_empty_table_is_null_because_nothing_is_left(drawn):
+    assert decide(drawn.map()).ending is Ending.NOTHING_LEFT
 
 
-def test_boxed_in_object_is_null(drawn):
+def test_a_push_comes_with_the_area_that_is_yet_to_be_segmented(drawn):
+    drawn.box(0.5, 0.0, 0.05, 0.04).box(0.4, 0.1, 0.05, 0.05, segmented=True)
+    decision = decide(drawn.map())
+    assert decision.push is not NO_PUSH
+    assert decision.ending is None
+    assert decision.unsettled_area == pytest.approx(0.05 * 0.04, rel=0.1)  # cells of 2 mm
+
+
+def test_boxed_in_object_is_null_because_the_pusher_has_no_room(drawn):
     drawn.box(0.5, 0.0, 0.13, 0.13, segmented=True)
     drawn.put((np.abs(drawn.centres() - [0.5, 0.0]) <= 0.05).all(-1), 0.05, False)
     drawn.objects[(np.abs(drawn.centres() - [0.5, 0.0]) <= 0.045).all(-1)] = False
     drawn.box(0.5, 0.0, 0.04, 0.04)  # 2.5 cm of room all around: too little for the bar
     drawn.segmented[(np.abs(drawn.centres() - [0.5, 0.0]) > 0.03).any(-1)] = True
-    assert act(drawn.map()) is None
+    decision = decide(drawn.map())
+    assert decision.push is NO_PUSH
+    assert decision.ending is Ending.NOTHING_VALID
+    assert decision.fails_most is Criterion.ACCESSIBLE
+    assert decision.failed[Criterion.ACCESSIBLE] == decision.candidates > 40
+    assert Criterion.HIGH_ENOUGH not in decision.failed
+    assert decision.unsettled_area == pytest.approx(0.04**2, rel=0.1)
+    assert "16 cm^2 are left to find: the area that the end effector needs is not free" in decision.why
+
+
+def test_thing_too_flat_for_the_bar_is_null_because_of_its_height(drawn):
+    decision = decide(drawn.box(0.5, 0.0, 0.04, 0.04, height=0.003).map())
+    assert decision.ending is Ending.NOTHING_VALID
+    assert decision.fails_most is Criterion.HIGH_ENOUGH
+
+
+def test_a_push_that_would_be_the_same_again_is_null_because_it_was_in_vain(drawn):
+    table = drawn.disc(0.5, 0.0, 0.03).map()
+    angles = np.arange(0, 2 * np.pi, 0.2)
+    tried = [
+        TriedPush(np.array([0.5 - 0.03 * c, -0.03 * s, 0.02]), np.array([c, s]), changed=False)
+        for c, s in zip(np.cos(angles), np.sin(angles), strict=True)
+    ]
+    decision = decide(table, tried=tried)
+    assert decision.ending is Ending.NOTHING_VALID
+    assert decision.fails_most is Criterion.NOT_IN_VAIN
+    assert decision.failed[Criterion.NOT_IN_VAIN] == decision.candidates
 
 
 def test_push_goes_through_the_center_of_a_lone_object(drawn):
@@ -103,7 +147,7 @@ def test_candidate_that_the_arm_cannot_do_is_passed_over(drawn):
 
     def plan_path(push):
         asked.append(push)
-        return "a path" if len(asked) == 3 else None
+        return "a path" if len(asked) == 3 else PathStage.POSTURE
 
     push = act(drawn.disc(0.5, 0.0, 0.03).map(), plan_path=plan_path)
     assert push.path == "a path"
@@ -111,8 +155,25 @@ def test_candidate_that_the_arm_cannot_do_is_passed_over(drawn):
     assert [p.cost for p in asked] == sorted(p.cost for p in asked)
 
 
-def test_without_any_reachable_candidate_the_action_is_null(drawn):
-    assert act(drawn.disc(0.5, 0.0, 0.03).map(), plan_path=lambda push: None) is None
+def test_without_any_reachable_candidate_the_action_is_null_because_there_is_no_path(drawn):
+    asked = []
+
+    def plan_path(push):
+        asked.append(push)
+        return PathStage.STROKE if len(asked) > 1 else PathStage.CROSSING
+
+    decision = decide(drawn.disc(0.5, 0.0, 0.03).map(), plan_path=plan_path)
+    assert decision.push is NO_PUSH
+    assert decision.ending is Ending.NO_PATH
+    assert decision.failed == {PathStage.CROSSING: 1, PathStage.STROKE: len(asked) - 1}
+    assert decision.candidates == len(asked)
+    assert decision.fails_most is PathStage.STROKE
+    # Nobody is asked again about as good as the same push, whichever clustering it came from.
+    assert 20 < len(asked) <= FindActionParameters().paths
+    for n, push in enumerate(asked):
+        for other in asked[:n]:
+            far = np.linalg.norm(push.p_WE[:2] - other.p_WE[:2]) >= 0.01
+            assert far or push.direction_W @ other.direction_W <= np.cos(0.2)
 
 
 def test_ring_is_pushed_though_its_center_is_empty(drawn):

@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from riseg_drake.pushing.decision import PathStage
 from riseg_drake.pushing.find_action import find_action
-from riseg_drake.pushing.push import ArmPhase
-from riseg_drake.pushing.push_path import PushPathParameters, plan_push_path
+from riseg_drake.pushing.push import NO_PUSH, ArmPhase
+from riseg_drake.pushing.push_path import PushPath, PushPathParameters, plan_push_path
 from riseg_drake.pushing.pusher import Pusher
-from riseg_drake.robot.kinematics import observe_pose
+from riseg_drake.robot.kinematics import observation_posture, observe_pose
 from riseg_drake.robot.limits import PANDA_LIMITS
 
 
@@ -23,8 +24,8 @@ def planned(drawn, panda, q_observe):
         drawn.map(),
         np.random.default_rng(0),
         plan_path=lambda push: plan_push_path(push, panda, q_observe, Pusher()),
-    )
-    assert push is not None
+    ).push
+    assert push is not NO_PUSH
     return push
 
 
@@ -88,6 +89,17 @@ def test_tip_never_comes_below_its_floor_and_crosses_above_everything(push, pand
     assert lowest >= Pusher().lowest_tip_height - 2e-4
 
 
+@pytest.mark.parametrize(("height", "tip"), [(0.005, 0.00225), (0.007, 0.00315)])
+def test_low_things_are_pushed_with_a_tip_as_low_as_they_are_and_room_below_it(
+    drawn, panda, q_observe, height, tip
+):
+    push = planned(drawn.box(0.5, 0.0, 0.05, 0.04, height=height), panda, q_observe)
+    lowest = min(panda.clearance(push.path.position(time)) for time in samples(push.path, 0.02))
+    assert push.tip_height == pytest.approx(tip)
+    assert lowest == pytest.approx(tip, abs=2e-4)
+    assert lowest < 0.004  # that it is the tip, not the arm, that comes this close
+
+
 def test_descent_is_straight_down(push, panda):
     path = push.path
     for time in samples(path, 0.02):
@@ -118,15 +130,57 @@ def test_tip_rises_first_where_the_observation_posture_is_lower_than_things(push
 
 @pytest.mark.parametrize("x", [0.95, 0.05])
 def test_push_out_of_reach_has_no_path(push, panda, q_observe, x):
-    assert plan_push_path(replace(push, p_WE=np.array([x, 0.1, 0.008])), panda, q_observe, Pusher()) is None
+    assert (
+        plan_push_path(replace(push, p_WE=np.array([x, 0.1, 0.008])), panda, q_observe, Pusher())
+        is PathStage.POSTURE
+    )
 
 
 def test_things_as_tall_as_the_pusher_are_not_pushed(push, panda, q_observe):
-    assert plan_push_path(replace(push, tallest=0.27), panda, q_observe, Pusher()) is None
+    assert (
+        plan_push_path(replace(push, tallest=0.27), panda, q_observe, Pusher())
+        is PathStage.ROOM_BELOW_THE_FLANGE
+    )
 
 
-def test_reaches_pushes_all_over_the_work_area(drawn, panda, q_observe):
+@pytest.fixture(scope="module")
+def q_leaning(panda):
+    return observation_posture(panda, [0.5, 0.0], 0.5, pitch=np.pi / 4)
+
+
+@pytest.fixture
+def push_from_45_degrees(drawn, panda, q_leaning):
+    return planned(drawn.box(0.5, 0.03, 0.05, 0.04, yaw=0.5), panda, q_leaning)
+
+
+def test_from_a_view_at_45_degrees_the_tool_is_set_upright_on_the_way_over_things(
+    push_from_45_degrees, panda, q_leaning
+):
+    push, path = push_from_45_degrees, push_from_45_degrees.path
+    assert path.position(0.0) == pytest.approx(q_leaning)
+    assert path.position(path.duration) == pytest.approx(q_leaning)
+    leans = []
+    for time in samples(path, 0.02):
+        X_WE = panda.X_WE(path.position(time))
+        leans.append(np.arccos(np.clip(-X_WE[2, 2], -1, 1)))
+        if X_WE[2, 3] < push.tallest + 0.005:
+            assert leans[-1] < 5e-3
+            assert np.linalg.norm(X_WE[:2, 3] - push.p_WE[:2]) < push.length + 1e-3
+    assert leans[0] == pytest.approx(np.pi / 4, abs=1e-6)
+    # Steadily, never by more than the joints' own speed allows in 20 ms.
+    assert np.abs(np.diff(leans)).max() < 0.03
+
+
+def test_from_a_view_at_45_degrees_no_joint_leaps_and_the_arm_keeps_clear(push_from_45_degrees, panda):
+    q = push_from_45_degrees.path.trajectory.vector_values(samples(push_from_45_degrees.path, 0.02)).T
+    assert np.abs(np.diff(q, axis=0)).max() < 0.04
+    assert all(panda.clearance(each) >= 0.003 for each in q[::3])
+
+
+@pytest.mark.parametrize("leaning", [False, True])
+def test_reaches_pushes_all_over_the_work_area(drawn, panda, q_observe, q_leaning, leaning):
     # Pushes towards the robot are partly out of reach: the camera ahead would be in the forearm's place.
+    q_from = q_leaning if leaning else q_observe
     planned_count = 0
     start = np.array([[0.38, -0.15], [0.38, 0.15], [0.62, -0.15], [0.62, 0.15], [0.5, 0.0]])
     template = planned(drawn.disc(0.5, 0.0, 0.03), panda, q_observe)
@@ -137,13 +191,13 @@ def test_reaches_pushes_all_over_the_work_area(drawn, panda, q_observe):
                 p_WE=np.append(p_W, 0.008),
                 direction_W=np.array([np.cos(angle), np.sin(angle)]),
             )
-            planned_count += plan_push_path(push, panda, q_observe, Pusher()) is not None
-    assert planned_count >= 26
+            planned_count += isinstance(plan_push_path(push, panda, q_from, Pusher()), PushPath)
+    assert planned_count >= (20 if leaning else 26)
 
 
-def test_path_that_takes_too_long_is_none(push, panda, q_observe):
+def test_path_that_takes_too_long_is_no_path(push, panda, q_observe):
     short = PushPathParameters(longest=push.path.duration - 0.1)
-    assert plan_push_path(push, panda, q_observe, Pusher(), short) is None
+    assert plan_push_path(push, panda, q_observe, Pusher(), short) is PathStage.DURATION
 
 
 def test_no_joint_leaps_between_samples(push):

@@ -29,7 +29,6 @@ def criteria(validity):
 def test_push_of_a_lone_box_is_valid(drawn, box):
     validity = judge(drawn, box)
     assert validity.valid.all()
-    assert validity.why_not(0) is None
 
 
 def test_center_beside_the_object_fails_the_first_criterion_alone(drawn, box):
@@ -37,21 +36,18 @@ def test_center_beside_the_object_fails_the_first_criterion_alone(drawn, box):
     drawn.objects[hole] = False
     validity = judge(drawn, box & ~hole)
     assert criteria(validity) == [False, True, True]
-    assert "center" in validity.why_not(0)
 
 
 def test_obstacle_where_the_end_effector_would_stand_fails_the_second_criterion_alone(drawn, box):
     drawn.box(0.455, 0.012, 0.01, 0.01)
     validity = judge(drawn, box)
     assert criteria(validity) == [True, False, True]
-    assert "end effector" in validity.why_not(0)
 
 
 def test_obstacle_ahead_of_the_object_fails_the_third_criterion_alone(drawn, box):
     drawn.box(0.545, 0.0, 0.04, 0.04)
     validity = judge(drawn, box)
     assert criteria(validity) == [True, True, False]
-    assert "other objects" in validity.why_not(0)
 
 
 @pytest.mark.parametrize(("gap", "valid"), [(0.010, True), (0.005, False)])

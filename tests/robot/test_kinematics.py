@@ -5,7 +5,9 @@ from pydrake.math import RotationMatrix
 from riseg_drake.robot.kinematics import (
     LIMIT_MARGIN,
     MIN_CLEARANCE,
+    OBSERVING_CLEARANCE,
     READY,
+    observation_posture,
     observe_pose,
     pose_error,
     tip_pointing_down,
@@ -28,6 +30,29 @@ def test_observing_looks_straight_down_at_the_point_from_the_height(panda):
     np.testing.assert_allclose(X_WC[:3, 3], [0.5, 0, 0.5], atol=1e-9)
     np.testing.assert_allclose(X_WC[:3, 2], [0, 0, -1], atol=1e-9)
     assert panda.X_WE(q)[2, 3] == pytest.approx(0.15)
+
+
+@pytest.mark.parametrize("pitch", [0.5, np.pi / 4, -np.pi / 4])
+def test_a_view_leans_by_its_pitch_and_still_meets_the_point(panda, pitch):
+    X_WC = observe_pose([0.5, 0.1, 0.0], 0.6, panda.X_EC, yaw=0.7, pitch=pitch) @ panda.X_EC
+    up, level = np.array([np.cos(0.7), np.sin(0.7), 0]), [-np.sin(0.7), np.cos(0.7), 0]
+    np.testing.assert_allclose(X_WC[:3, 2], np.sin(pitch) * up + [0, 0, -np.cos(pitch)], atol=1e-12)
+    np.testing.assert_allclose(X_WC[:3, 3] + 0.6 * X_WC[:3, 2], [0.5, 0.1, 0.0], atol=1e-12)
+    assert X_WC[:3, 0] @ level == pytest.approx(-1.0)  # the image's horizontal axis stays horizontal
+
+
+def test_the_arm_observes_at_45_degrees_with_room_around_it(panda):
+    q = observation_posture(panda, [0.5, 0.0], 0.5, pitch=np.pi / 4)
+    X_WC = panda.X_WC(q)
+    assert X_WC[2, 2] == pytest.approx(-np.cos(np.pi / 4))
+    np.testing.assert_allclose(X_WC[:3, 3] + 0.5 * X_WC[:3, 2], [0.5, 0.0, 0.0], atol=1e-9)
+    assert PANDA_LIMITS.room(q).min() > 1.0
+    assert panda.clearance(q) >= OBSERVING_CLEARANCE
+
+
+def test_a_view_that_leans_too_far_is_refused_in_one_line(panda):
+    with pytest.raises(ValueError, match=r"no posture looks at .* leaning by observe_pitch: 1.5 rad"):
+        observation_posture(panda, [0.5, 0.0], 1.4, pitch=1.5)
 
 
 def test_solutions_reach_the_pose_within_limits_and_free_of_collision(panda):

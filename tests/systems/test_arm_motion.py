@@ -11,6 +11,7 @@ from pydrake.systems.primitives import VectorLogSink
 
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR, Frame, FramePair
+from riseg_drake.pushing.decision import UNDECIDED, Decision, Ending
 from riseg_drake.pushing.push import NO_PUSH, ArmPhase, Push
 from riseg_drake.pushing.push_path import PushPath
 from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest
@@ -20,6 +21,7 @@ from riseg_drake.systems.arm_motion import ArmMotion, ArmMotionParameters, Permi
 Q_OBSERVE = np.array([0.0, -0.54, 0.0, -2.55, 0.0, 2.01, 0.0])
 CAMERA = Intrinsics(4, 4, 2.0, 2.0, 1.5, 1.5)
 SECONDS = 1 / 15
+NOTHING_LEFT = Decision(ending=Ending.NOTHING_LEFT, unsettled_area=0.0)
 
 
 def push_to(q_there, start_offset=0.0, at=0.0, limits=None):
@@ -47,9 +49,10 @@ def push_to(q_there, start_offset=0.0, at=0.0, limits=None):
 
 @dataclass
 class Script:
-    """What the stand-in answers: a push for each interaction, then NO_PUSH; and what the mask shows."""
+    """What the stand-in answers: a push for each interaction, then a null; and what the mask shows."""
 
     pushes: list
+    null: Decision = NOTHING_LEFT
     ids_after: list = field(default_factory=lambda: [0] * 9)
     asked: list = field(default_factory=list)
 
@@ -76,12 +79,18 @@ class Eyes(LeafSystem):
             number = script.ids_after[step.Eval(context)]
             output.set_value(np.full((4, 4), number, np.uint16))
 
-        def push(context, output):
+        def decision(context, output):
             script.asked.append((context.get_time(), frame(context).time))
             done = step.Eval(context)
-            output.set_value(script.pushes[done] if done < len(script.pushes) else NO_PUSH)
+            output.set_value(
+                Decision(script.pushes[done], unsettled_area=0.01) if done < len(script.pushes) else script.null
+            )
 
-        for name, model, calc in (("pair", NO_PAIR, pair), ("mask", NO_MASK, mask), ("push", NO_PUSH, push)):
+        for name, model, calc in (
+            ("pair", NO_PAIR, pair),
+            ("mask", NO_MASK, mask),
+            ("decision", UNDECIDED, decision),
+        ):
             self.DeclareAbstractOutputPort(
                 name, AbstractValue.Make(model).Clone, calc, time | {self.all_input_ports_ticket()}
             )
@@ -92,7 +101,7 @@ def wired(script, parameters=None, way_back=None):
     builder = DiagramBuilder()
     motion = builder.AddSystem(ArmMotion(Q_OBSERVE, parameters, way_back=way_back))
     eyes = builder.AddSystem(Eyes(script))
-    for name in ("pair", "mask", "push"):
+    for name in ("pair", "mask", "decision"):
         builder.Connect(eyes.GetOutputPort(name), motion.GetInputPort(name))
     builder.Connect(motion.GetOutputPort("interaction_step"), eyes.GetInputPort("interaction_step"))
     builder.Connect(motion.GetOutputPort("position"), motion.GetInputPort("position_measured"))
@@ -175,7 +184,35 @@ def test_most_interactions_end_the_run():
     phases, motion, context, _ = run(script, 8.0, ArmMotionParameters(most_interactions=1))
     assert phases[-1] is ArmPhase.DONE
     assert motion.GetOutputPort("interaction_step").Eval(context) == 1
-    assert len(script.asked) == 1
+    assert len(script.asked) == 2  # the second time to know what is left
+
+
+@pytest.mark.parametrize(
+    ("null", "most", "ending", "area"),
+    [
+        (Decision(ending=Ending.NO_PATH, unsettled_area=0.004), 5, Ending.NO_PATH, 0.004),
+        (Decision(ending=Ending.NOTHING_VALID, unsettled_area=0.004), 5, Ending.NOTHING_VALID, 0.004),
+        (NOTHING_LEFT, 5, Ending.NOTHING_LEFT, 0.0),
+        (Decision(ending=Ending.NOTHING_VALID, unsettled_area=0.004), 1, Ending.ENOUGH_INTERACTIONS, 0.004),
+        (NOTHING_LEFT, 1, Ending.NOTHING_LEFT, 0.0),
+    ],
+    ids=["no path", "nothing valid", "nothing left", "enough", "nothing left after enough"],
+)
+def test_the_last_decision_says_why_the_arm_is_done(null, most, ending, area):
+    script = Script([push_to(THERE)], null)
+    phases, motion, context, _ = run(script, 8.0, ArmMotionParameters(most_interactions=most))
+    assert phases[-1] is ArmPhase.DONE
+    last = motion.GetOutputPort("last_decision").Eval(context)
+    assert (last.push, last.ending, last.unsettled_area) == (NO_PUSH, ending, area)
+
+
+def test_where_pushes_are_used_up_with_something_left_that_is_the_reason():
+    phases, motion, context, _ = run(
+        Script([push_to(THERE)] * 9), 8.0, ArmMotionParameters(most_interactions=1)
+    )
+    assert phases[-1] is ArmPhase.DONE
+    last = motion.GetOutputPort("last_decision").Eval(context)
+    assert (last.push, last.ending, last.unsettled_area) == (NO_PUSH, Ending.ENOUGH_INTERACTIONS, 0.01)
 
 
 def test_push_is_remembered_with_whether_it_changed_the_mask():
@@ -205,7 +242,7 @@ def run_permitted(script, until, permit):
     builder = DiagramBuilder()
     motion = builder.AddSystem(ArmMotion(Q_OBSERVE, None, permit))
     eyes = builder.AddSystem(Eyes(script))
-    for name in ("pair", "mask", "push"):
+    for name in ("pair", "mask", "decision"):
         builder.Connect(eyes.GetOutputPort(name), motion.GetInputPort(name))
     builder.Connect(motion.GetOutputPort("interaction_step"), eyes.GetInputPort("interaction_step"))
     builder.Connect(motion.GetOutputPort("position"), motion.GetInputPort("position_measured"))
@@ -243,7 +280,7 @@ def test_an_arm_that_has_not_set_out_yet_is_not_taken_for_one_that_is_back():
     builder = DiagramBuilder()
     motion = builder.AddSystem(ArmMotion(Q_OBSERVE, None, None, lambda: late[0]))
     eyes = builder.AddSystem(Eyes(Script([push_to(THERE), push_to(THERE, at=0.1)])))
-    for name in ("pair", "mask", "push"):
+    for name in ("pair", "mask", "decision"):
         builder.Connect(eyes.GetOutputPort(name), motion.GetInputPort(name))
     builder.Connect(motion.GetOutputPort("interaction_step"), eyes.GetInputPort("interaction_step"))
     builder.Connect(motion.GetOutputPort("position"), motion.GetInputPort("position_measured"))

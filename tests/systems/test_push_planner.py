@@ -8,9 +8,12 @@ from pydrake.common.value import Value
 
 from riseg_drake.geometry.camera import Intrinsics, rays
 from riseg_drake.geometry.rgbd import NO_PAIR, Frame, FramePair
+from riseg_drake.pushing import push_planning
+from riseg_drake.pushing.decision import UNDECIDED, Ending
 from riseg_drake.pushing.push import NO_PUSH
+from riseg_drake.pushing.push_path import plan_push_path
 from riseg_drake.pushing.tried_pushes import TriedPush
-from riseg_drake.robot.kinematics import PandaKinematics, observe_pose
+from riseg_drake.robot.kinematics import PandaKinematics, observation_posture, observe_pose
 from riseg_drake.systems.push_planner import PushPlanner
 
 CAMERA = Intrinsics(640, 480, 616.285, 615.778, 301.418, 232.864)
@@ -34,7 +37,16 @@ def q_observe(panda):
 
 
 @pytest.fixture(scope="module")
+def q_leaning(panda):
+    return observation_posture(panda, [0.5, 0.0], 0.5, pitch=np.pi / 4)
+
+
+@pytest.fixture(scope="module")
 def scene(panda, q_observe):
+    return seen_from(panda, q_observe)
+
+
+def seen_from(panda, q_observe):
     """A flat cylinder of 3 cm radius and 4 cm height at (0.5, 0.05), as the wrist camera sees its top."""
     X_WC = panda.X_WC(q_observe)
     direction_W = rays(CAMERA) @ X_WC[:3, :3].T
@@ -57,14 +69,14 @@ def evaluate(panda, q_observe, pair, above, mask, tried=None, seed=0):
     planner.GetInputPort("position").FixValue(context, q_observe)
     if tried is not None:
         planner.GetInputPort("tried_pushes").FixValue(context, Value[object](tried))
-    return planner.GetOutputPort("push").Eval(context)
+    return planner.GetOutputPort("decision").Eval(context)
 
 
 NOTHING = np.zeros(CAMERA.shape, np.uint16)
 
 
 def test_push_goes_through_the_object_and_has_a_path_from_here_to_here(panda, q_observe, scene):
-    push = evaluate(panda, q_observe, *scene, NOTHING)
+    push = evaluate(panda, q_observe, *scene, NOTHING).push
     assert push.center_W == pytest.approx([0.5, 0.05], abs=0.002)
     assert push.path.position(0.0) == pytest.approx(q_observe)
     assert push.path.position(push.path.duration) == pytest.approx(q_observe)
@@ -73,23 +85,46 @@ def test_push_goes_through_the_object_and_has_a_path_from_here_to_here(panda, q_
     assert np.linalg.norm(reached - push.center_W) == pytest.approx(0.03 + 0.01 - 0.02, abs=0.003)
 
 
+def test_from_a_view_at_45_degrees_a_push_with_a_path_is_found_at_once(panda, q_leaning, monkeypatch):
+    asked = []
+
+    def plan_path(*arguments):
+        asked.append(plan_push_path(*arguments))
+        return asked[-1]
+
+    monkeypatch.setattr(push_planning, "plan_push_path", plan_path)
+    decision = evaluate(panda, q_leaning, *seen_from(panda, q_leaning), NOTHING)
+    assert decision.ending is None
+    assert decision.push.center_W == pytest.approx([0.5, 0.05], abs=0.003)
+    assert decision.push.path.position(0.0) == pytest.approx(q_leaning)
+    assert decision.push.path.position(decision.push.path.duration) == pytest.approx(q_leaning)
+    reached = panda.X_WE(decision.push.path.position(decision.push.path.push_end))
+    assert np.linalg.norm(reached[:2, 3] - decision.push.center_W) == pytest.approx(
+        0.03 + 0.01 - 0.02, abs=0.004
+    )
+    np.testing.assert_allclose(reached[:3, 2], [0, 0, -1], atol=2e-3)
+    assert len(asked) <= 5  # of some 270 valid candidates
+
+
 def test_segmented_scene_gives_null(panda, q_observe, scene):
-    assert evaluate(panda, q_observe, *scene, scene[1].mask.astype(np.uint16)) is NO_PUSH
+    decision = evaluate(panda, q_observe, *scene, scene[1].mask.astype(np.uint16))
+    assert decision.push is NO_PUSH
+    assert decision.ending is Ending.NOTHING_LEFT
 
 
-def test_before_the_first_frame_there_is_no_push(panda, q_observe, scene):
-    assert evaluate(panda, q_observe, NO_PAIR, scene[1], NOTHING) is NO_PUSH
+def test_before_the_first_frame_nothing_is_decided(panda, q_observe, scene):
+    assert evaluate(panda, q_observe, NO_PAIR, scene[1], NOTHING) is UNDECIDED
 
 
 def test_same_seed_and_frame_give_the_same_push(panda, q_observe, scene):
-    first, second = (evaluate(panda, q_observe, *scene, NOTHING, seed=5) for _ in range(2))
+    first, second = (evaluate(panda, q_observe, *scene, NOTHING, seed=5).push for _ in range(2))
     assert np.array_equal(first.p_WE, second.p_WE)
 
 
 def test_push_tried_in_vain_is_not_proposed_again(panda, q_observe, scene):
-    first = evaluate(panda, q_observe, *scene, NOTHING)
+    first = evaluate(panda, q_observe, *scene, NOTHING).push
     tried = (TriedPush(first.p_WB, first.direction_W, changed=False),)
-    second = evaluate(panda, q_observe, *scene, NOTHING, tried=tried)
+    second = evaluate(panda, q_observe, *scene, NOTHING, tried=tried).push
     assert first.direction_W @ second.direction_W < np.cos(0.5)
 
 
@@ -97,4 +132,4 @@ def test_ports_have_the_names_of_the_contract(panda):
     planner = PushPlanner(panda)
     names = [planner.get_input_port(i).get_name() for i in range(planner.num_input_ports())]
     assert names == ["pair", "above_table", "mask", "position", "tried_pushes"]
-    assert planner.get_output_port().get_name() == "push"
+    assert planner.get_output_port().get_name() == "decision"

@@ -1,0 +1,78 @@
+"""What is counted between two steps, with a stand-in for the diagram."""
+
+import numpy as np
+import pytest
+
+from riseg_drake.app.interactions import Truth, _Book
+from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.pushing.push import NO_PUSH
+from riseg_drake.systems.stage_clock import StageClock
+
+SIZE = (8, 40)
+CAMERA = Intrinsics(SIZE[1], SIZE[0], 40.0, 40.0, 19.5, 3.5)
+
+
+class Scene:
+    """One thing, 10 columns wide, that is moved along x; the mask shows `found` of its columns."""
+
+    def __init__(self):
+        self.x, self.found, self.drawn = 0.5, 10, []
+
+    def mask(self, _):
+        mask = np.zeros(SIZE, np.uint16)
+        mask[:, 5 : 5 + self.found] = 3
+        return mask
+
+    def read(self, _, __):
+        return NO_PUSH
+
+    def truth(self, frame, _):
+        def draw():
+            self.drawn.append(frame.sequence)
+            labels = np.zeros(SIZE, np.uint16)
+            labels[:, 5:15] = 1
+            return labels
+
+        X_WB = np.eye(4)
+        X_WB[0, 3] = self.x
+        return Truth(draw, {"toy": X_WB}, {1: "toy"})
+
+
+def frame(sequence):
+    color, depth = np.zeros((*SIZE, 3), np.uint8), np.full(SIZE, 0.5, np.float32)
+    return Frame(sequence, sequence / 15, CAMERA, color, depth, np.eye(4), np.zeros(SIZE, bool))
+
+
+def test_moved_objects_are_scored_in_every_frame_from_one_centimetre_on_and_drawn_in_no_other():
+    scene = Scene()
+    book = _Book(scene, None, StageClock(), scene.truth)
+    book.count(frame(0), is_at_rest=True)
+    assert book.close(0).in_motion is None
+    scene.drawn.clear()
+    # The arm approaches, pushes by 2 cm, goes back, and looks again.
+    for sequence, (x, found) in enumerate(
+        [(0.500, 10), (0.505, 10), (0.5099, 10), (0.5101, 5), (0.52, 10), (0.52, 0)], start=1
+    ):
+        scene.x, scene.found = x, found
+        book.count(frame(sequence), is_at_rest=False)
+    assert scene.drawn == [4, 5, 6]
+    scene.found = 8
+    book.count(frame(7), is_at_rest=True)
+    figures = book.close(1).in_motion
+    assert figures.frames == 3
+    assert figures.overlap_f == pytest.approx((2 / 3 + 1 + 0) / 3)  # P = 1, R = 1 / 2; all; nothing
+    assert figures.at_rest_f == pytest.approx(2 * 0.8 / 1.8)
+    # The next interaction counts from where things stand now.
+    book.count(frame(8), is_at_rest=False)
+    book.count(frame(9), is_at_rest=True)
+    assert book.close(2).in_motion is None
+
+
+def test_where_nobody_knows_the_truth_nothing_is_scored():
+    scene = Scene()
+    book = _Book(scene, None, StageClock(), lambda frame, context: None)
+    for step in range(2):
+        book.count(frame(2 * step), is_at_rest=False)
+        book.count(frame(2 * step + 1), is_at_rest=True)
+        assert book.close(step).in_motion is None
