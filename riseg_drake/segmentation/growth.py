@@ -56,7 +56,7 @@ def grow_by_similar_flow(
 
 
 def _nearest_seed_group(
-    shape: tuple[int, int], seeds: NDArray[np.intp], group: NDArray[np.intp]
+    shape: tuple[int, ...], seeds: NDArray[np.intp], group: NDArray[np.intp]
 ) -> NDArray[np.intp]:
     """For each pixel the group of the seed nearest to it, [H, W]."""
     away = np.ones(shape, np.uint8)

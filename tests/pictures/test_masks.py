@@ -17,7 +17,8 @@ def test_the_background_stays_as_it_is_and_so_does_the_image_given():
 
 
 def test_touching_objects_are_parted_by_a_dark_rim_between_lines_in_their_colours():
-    picture = draw_masks(np.full((60, 80, 3), 200, np.uint8), MASK)
+    # Without numbers: OpenCV 4 and 5 write them in different fonts.
+    picture = draw_masks(np.full((60, 80, 3), 200, np.uint8), MASK, numbers=False)
     np.testing.assert_array_equal(picture[25, 37:39], [ORANGE, ORANGE])
     np.testing.assert_array_equal(picture[25, 41:43], [BLUE, BLUE])
     assert picture[25, 39:41].max() < 70

@@ -14,7 +14,7 @@ def frames(number, rng):
     """Frames as a camera of millimetre resolution gives them, 1/15 s apart."""
     for k in range(number):
         X_WC = np.eye(4)
-        X_WC[:3, :3] = Rotation.random(rng=rng).as_matrix()
+        X_WC[:3, :3] = Rotation.random(None, rng).as_matrix()
         X_WC[:3, 3] = rng.normal(size=3)
         depth = rng.integers(0, 3000, INTRINSICS.shape).astype(np.float32) * np.float32(0.001)
         yield RecordedFrame(
