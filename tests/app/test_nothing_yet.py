@@ -24,6 +24,7 @@ from riseg_drake.pushing.push import NO_PUSH, ArmPhase
 from riseg_drake.robot.kinematics import READY, PandaKinematics
 from riseg_drake.stations.ideal_arm import status_message
 from riseg_drake.stations.lcm_images import encode_images
+from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.lcm_reception import Reception
 from riseg_drake.systems.frame_view import FrameView
 from riseg_drake.systems.mask_refiner import NO_REFINED_MASK
@@ -106,7 +107,7 @@ def test_a_simulation_with_refiner_and_browser_before_it_runs_and_when_a_push_is
 def test_a_robot_before_its_first_picture_and_after():
     scenario = load_scenario(None, HARDWARE)
     lcm, config = DrakeLcm("memq://"), scenario.hardware
-    reception = Reception(lcm, config.lcm, clock=lambda: FUTURE)
+    reception = Reception(lcm, config.lcm, clock=EvenClock(lambda: FUTURE, lambda: 0.0))
     wired = make_diagram(scenario, seed=0, meshcat=Meshcat(), drivers=Drivers(reception))
     simulator = Simulator(wired.diagram)
     context = simulator.get_mutable_context()
