@@ -21,8 +21,8 @@ from riseg_drake.robot.command_stream import VELOCITY, ArmStatus, CommandStream
 LONGEST_PAUSE = 0.05
 """The longest pause that is made up for, s: half the driver's expiry. An arm at 0.3 rad/s brakes in 40 ms."""
 STILL, STILL_FOR = 0.002, 0.02
-"""An arm that has been left alone is at rest where no joint turns by more than the one, rad, in the other, s:
-below 0.1 rad/s it stops within a milliradian."""
+"""An arm that has been left alone has come to rest where no joint turns by more than the one, rad, in the
+other, s: below 0.1 rad/s it stops within a milliradian."""
 
 
 @dataclass(frozen=True)

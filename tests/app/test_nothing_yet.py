@@ -22,6 +22,7 @@ from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.app.segmentation_block import make_segmentation, panda_view
 from riseg_drake.pushing.push import NO_PUSH, ArmPhase
 from riseg_drake.robot.kinematics import READY, PandaKinematics
+from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.ideal_arm import status_message
 from riseg_drake.stations.lcm_images import encode_images
 from riseg_drake.stations.lcm_reception import Reception
@@ -106,7 +107,8 @@ def test_a_simulation_with_refiner_and_browser_before_it_runs_and_when_a_push_is
 def test_a_robot_before_its_first_picture_and_after():
     scenario = load_scenario(None, HARDWARE)
     lcm, config = DrakeLcm("memq://"), scenario.hardware
-    reception = Reception(lcm, config.lcm, clock=lambda: FUTURE)
+    now = FUTURE
+    reception = Reception(lcm, config.lcm, clock=EvenClock(lambda: now, lambda: now))
     wired = make_diagram(scenario, seed=0, meshcat=Meshcat(), drivers=Drivers(reception))
     simulator = Simulator(wired.diagram)
     context = simulator.get_mutable_context()
@@ -116,6 +118,7 @@ def test_a_robot_before_its_first_picture_and_after():
     walk(wired.diagram, context)
     color, depth = np.full((480, 848, 3), 100, np.uint8), np.full((480, 848), 0.5, np.float32)
     for time in (FUTURE + 0.2, FUTURE + 0.3, FUTURE + 0.4):
+        now = time + 0.01
         lcm.Publish(config.lcm.status_channel, status_message(time - 0.01, READY).encode())
         lcm.Publish(config.lcm.status_channel, status_message(time + 0.01, READY).encode())
         lcm.Publish(config.lcm.image_channel, encode_images(color, depth, time, time, 0).encode())

@@ -14,7 +14,8 @@ def test_the_bench_times_both_networks_and_says_where(tmp_path, monkeypatch, cap
     monkeypatch.setattr(raft_bench, "REPETITIONS", 1)
     path = tmp_path / "scene.yaml"
     path.write_text(
-        "station: {camera: {width: 128, height: 128}}\noptical_flow: {raft: {iterations: 1, device: cpu}}\n"
+        "station: {camera: {width: 128, height: 128, cx: 63.5, cy: 63.5}}\n"
+        "optical_flow: {raft: {iterations: 1, device: cpu}}\n"
     )
     assert main(["bench", "--raft", str(path)]) == 0
     printed = " ".join(capsys.readouterr().out.split())
