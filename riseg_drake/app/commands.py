@@ -13,7 +13,9 @@ def run(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg run`."""
     from riseg_drake.app.run import run_command
 
-    run_command(chosen.scenario, chosen.seed, chosen.output, chosen.record, chosen.meshcat, console)
+    run_command(
+        chosen.scenario, chosen.seed, chosen.output, chosen.record, chosen.meshcat, chosen.overwrite, console
+    )
 
 
 def evaluate(chosen: argparse.Namespace, console: Console) -> None:
@@ -31,6 +33,7 @@ def evaluate(chosen: argparse.Namespace, console: Console) -> None:
         chosen.ablation,
         chosen.baseline,
         chosen.masks,
+        chosen.overwrite,
         console,
     )
 
@@ -83,6 +86,8 @@ def segment(chosen: argparse.Namespace, console: Console) -> None:
             robot=chosen.robot,
             camera_frame=chosen.camera_frame,
             stamp_limit=chosen.stamp_limit,
+            follow=chosen.follow,
+            overwrite=chosen.overwrite,
         ),
         console,
     )

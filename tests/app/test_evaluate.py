@@ -1,15 +1,15 @@
 import json
-import signal
 
 import cv2
 import numpy as np
 import pytest
 from rich.console import Console
 
-from riseg_drake.app import scene_pool, scene_work
+from riseg_drake.app import scene_work
 from riseg_drake.app.cli import main
 from riseg_drake.app.evaluate import evaluate, scene_tasks
-from riseg_drake.app.output import OutputError, RunFolder, Step
+from riseg_drake.app.output import RunFolder, Step
+from riseg_drake.app.output_folder import OutputError
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.scene_folder import is_finished, read_result
 from riseg_drake.app.scene_pool import cluster_pool, local_pool
@@ -158,7 +158,7 @@ def work_in_processes(seed_one_dies=False):
         from riseg_drake.app.scenario import Scenario
         from riseg_drake.app.scene_work import SceneOutcome
 
-        folder = RunFolder(task.folder, task.settings)
+        folder = RunFolder(task.folder, task.settings, overwrite=True)
         if seed_one_dies and task.seed == 1:
             time.sleep(0.5)
             os._exit(9)
@@ -203,13 +203,6 @@ def test_a_dask_cluster_sends_back_what_a_scene_leaves(tmp_path):
         there = tmp_path / "cluster" / path.relative_to(tmp_path / "here")
         assert there.read_bytes() == path.read_bytes()
     assert len(read_result(todo[1]).scores) == LAST_STEP
-
-
-def test_children_do_not_hear_ctrl_c_and_their_parent_does():
-    before = signal.getsignal(signal.SIGINT)
-    with scene_pool._deaf_children():
-        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-    assert signal.getsignal(signal.SIGINT) is before
 
 
 @pytest.mark.parametrize(

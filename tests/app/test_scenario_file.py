@@ -75,7 +75,7 @@ def test_a_file_that_is_no_text_is_refused(tmp_path):
     (tmp_path / "x.yaml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ScenarioError, match="not a readable text file"):
         read_scenario(tmp_path / "x.yaml", Scene)
-    with pytest.raises(ScenarioError, match="not a readable text file"):
+    with pytest.raises(ScenarioError, match="a folder, not a file"):
         read_scenario(tmp_path, Scene)
 
 

@@ -1,0 +1,88 @@
+"""The door for signals and child processes: who is stopped by what, and who ends with whom.
+
+Ctrl-C (SIGINT), `kill` (SIGTERM) and a terminal that is closed (SIGHUP) all stop a command in the same way: a
+KeyboardInterrupt, after which it leaves whole files. Its exit code is 128 and the signal's number, as shells
+have it.
+"""
+
+import ctypes
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import FrameType
+
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_IMPORT = "<frozen importlib._bootstrap>"
+_PR_SET_PDEATHSIG = 1
+
+
+@dataclass
+class Stop:
+    """Whether this process was asked to stop."""
+
+    signal: int = 0
+    """The number of the first signal that asked for it; 0 while none did."""
+
+    @property
+    def exit_code(self) -> int:
+        """As shells have it."""
+        return 128 + (self.signal or signal.SIGINT)
+
+
+@contextmanager
+def stopped_by_signals(loader: str) -> Iterator[Stop]:
+    """For the time of a `with`, every stop signal raises KeyboardInterrupt; the Stop says which came.
+
+    While a function of the file `loader` imports its modules the process ends at once instead: nothing has
+    been begun, and what is raised in a module of C++ comes out as an ImportError, or not at all.
+    """
+    stop = Stop()
+
+    def hear(number: int, frame: FrameType | None) -> None:
+        stop.signal = stop.signal or number
+        if _is_loading(frame, loader):
+            os.write(2, b"riseg: stopped\n")
+            os._exit(stop.exit_code)
+        raise KeyboardInterrupt
+
+    before = {}
+    if threading.current_thread() is threading.main_thread():  # others may not touch signals
+        # What is ignored stays so: that is how shells start programs in the background, and nohup.
+        heard = [number for number in STOP_SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
+        before = {number: signal.signal(number, hear) for number in heard}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Ctrl-C waits until the end of a `with`, and is not lost; processes begun in it never hear Ctrl-C."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def end_with_parent(parent: int) -> None:
+    """Make the system kill this process when its parent, of that process id, has ended however it did."""
+    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:  # it was quicker
+        os._exit(1)
+
+
+def _is_loading(frame: FrameType | None, loader: str) -> bool:
+    """Whether the outermost import that is under way was begun by a function of the file `loader`."""
+    outermost = ""
+    while frame is not None:
+        importer = frame.f_back
+        if frame.f_code.co_filename == _IMPORT and importer and importer.f_code.co_filename != _IMPORT:
+            outermost = importer.f_code.co_filename
+        frame = importer
+    return outermost == loader
