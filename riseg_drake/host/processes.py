@@ -60,6 +60,12 @@ def stopped_by_signals(loader: str) -> Iterator[Stop]:
             signal.signal(number, handler)
 
 
+def heed_no_more() -> None:
+    """All is done but for Python's own end: a stop signal has nothing more to stop, and changes no exit code."""
+    for number in STOP_SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+
+
 @contextmanager
 def undisturbed() -> Iterator[None]:
     """Ctrl-C waits until the end of a `with`, and is not lost; processes begun in it never hear Ctrl-C."""
