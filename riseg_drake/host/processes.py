@@ -61,7 +61,7 @@ def stopped_by_signals(loader: str) -> Iterator[Stop]:
 
 
 def heed_no_more() -> None:
-    """All is done but for Python's own end: a stop signal has nothing more to stop, and changes no exit code."""
+    """All is done but for Python's own end: a stop signal has nothing to stop, and changes no exit code."""
     for number in STOP_SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 

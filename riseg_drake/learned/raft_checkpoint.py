@@ -4,6 +4,7 @@ princeton-vl (the authors; often with `module.` before every name) and torchvisi
 """
 
 import re
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -41,7 +42,9 @@ def read_checkpoint(path: Path) -> dict[str, Tensor]:
         raise ModelError(f"{path} is not there; give the file of a RAFT checkpoint (see docs/learned.md)")
     _check_size(path)
     try:
-        content = torch.load(path, map_location="cpu", weights_only=True)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # torch wonders aloud about what is damaged
+            content = torch.load(path, map_location="cpu", weights_only=True)
     except Exception as error:
         # pickle, zip and torch each have their own, and torch's words advise to run what is in the file.
         raise ModelError(

@@ -1,7 +1,7 @@
 """The commands that are stopped at random moments: what each is given, and what must hold of what it leaves.
 
-To try another one, add a `Stoppable` to `stoppables`; `beside` are commands that run as long as it does, such as
-`riseg emulate` beside `riseg hardware`.
+To try another one, add a `Stoppable` to `stoppables`; `beside` are commands that run as long as it does, such
+as `riseg emulate` beside `riseg hardware`.
 """
 
 import json
@@ -49,7 +49,17 @@ def stoppables(place: Path) -> dict[str, Stoppable]:
     if not recording.exists():
         write(recording, drawn_frames(FRAMES), SMALL)
     (place / "short.yaml").write_text(f"{SCENARIO}longest: 3.0\n")
-    evaluate = ("evaluate", "--scenario", str(place / "short.yaml"), "--seed", "1", "--scenes", "2", "--jobs", "2")
+    evaluate = (
+        "evaluate",
+        "--scenario",
+        str(place / "short.yaml"),
+        "--seed",
+        "1",
+        "--scenes",
+        "2",
+        "--jobs",
+        "2",
+    )
     return {
         each.name: each
         for each in (
@@ -61,7 +71,7 @@ def stoppables(place: Path) -> dict[str, Stoppable]:
 
 
 def wrong_run(folder: Path, right: Path) -> list[str]:
-    """Steps that the summary lists are there, whole, and those of the undisturbed run; so are recorded frames."""
+    """Listed steps are there, whole, and those of the undisturbed run; recorded frames are whole."""
     summary, complaints = _summary(folder)
     listed = [entry["step"] for entry in summary.get("steps", [])]
     if listed != list(range(len(listed))):

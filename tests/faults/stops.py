@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -125,10 +126,8 @@ def _start(arguments: tuple[str, ...]) -> subprocess.Popen:
 
 def _end(process: subprocess.Popen) -> None:
     """End a command with all its processes."""
-    try:
+    with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
-    except ProcessLookupError:
-        pass
     process.wait()
 
 
@@ -159,7 +158,11 @@ def _processes(session: int) -> list[tuple[int, str]]:
 def _complaints(command: Stoppable, output: Path, right: Path, number: int, ended: Ended) -> list[str]:
     expected = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -9, signal.SIGSTOP: 0}[number]
     finished = ended.code == 0 and '"state": "done"' in _text(output / "summary.json")  # it came too late
-    complaints = [] if ended.code == expected or finished else [f"exit code {ended.code}, not {expected}: {ended.errors}"]
+    complaints = (
+        []
+        if ended.code == expected or finished
+        else [f"exit code {ended.code}, not {expected}: {ended.errors}"]
+    )
     lines = ended.errors.strip().splitlines()
     if number in (signal.SIGINT, signal.SIGTERM) and len(lines) != (not finished):
         complaints.append(f"{len(lines)} lines of errors: {ended.errors[-600:]}")

@@ -1,4 +1,4 @@
-"""What was tried and what went wrong, by kind; kept in a file line by line, so that a trial may run in parts."""
+"""What was tried and what went wrong, by kind; kept in a file, so that a trial may run in parts."""
 
 import json
 from collections import Counter
