@@ -49,11 +49,11 @@ def _refused(error: Exception) -> int:
     words = str(error)
     if isinstance(error, OSError):
         # No room, no permission, no such place: the machine refuses, wherever in the program that is noticed.
-        words = f"{error.filename}: {error.strerror}" if error.filename else error.strerror or words
+        words = f"{error.filename or 'the output'}: {error.strerror or words}"
     try:
         can_write()
     except OSError as full:
-        words = f"nothing can be written to the output: {full.strerror}"
+        words = f"the output: {full.strerror}"
         drop_output()
     tell_error(words)
     return BAD_INPUT

@@ -9,6 +9,7 @@ Whenever it is stopped, the masks that are there are whole, and the summary says
 """
 
 import re
+import struct
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -45,7 +46,6 @@ class SegmentFolder:
         self.path = folder
         self._rate = rate
         self._video: cv2.VideoWriter | None = None
-        self._shown = 0
         self._scores: GrowingText | None = None
         self._names: set[str] = set()
         self._folder = OutputFolder(folder, COMMAND, PARTS, {**about, "state": "running"}, overwrite=overwrite)
@@ -92,7 +92,7 @@ class SegmentFolder:
         self._video.release()
         self._video = None
         unfinished = self.path / _UNFINISHED_VIDEO
-        if int(cv2.VideoCapture(str(unfinished)).get(cv2.CAP_PROP_FRAME_COUNT)) == self._shown:
+        if _is_whole_video(unfinished):
             unfinished.replace(self.path / VIDEO)
         else:
             unfinished.unlink(missing_ok=True)
@@ -122,6 +122,23 @@ class SegmentFolder:
             file = str(self.path / _UNFINISHED_VIDEO)
             # The codec wants even sizes.
             self._video = cv2.VideoWriter(file, code, rate, (width + width % 2, height + height % 2))
-        self._shown += 1
         bgr = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
         self._video.write(cv2.copyMakeBorder(bgr, 0, height % 2, 0, width % 2, cv2.BORDER_REPLICATE))
+
+
+def _is_whole_video(path: Path) -> bool:
+    """Whether an MP4 file is there with all its boxes, the index (moov) among them; OpenCV never says."""
+    if not path.exists():
+        return False
+    found, start, size = set(), 0, path.stat().st_size
+    with path.open("rb") as file:
+        while start < size:
+            file.seek(start)
+            length, kind = struct.unpack(">I4s", file.read(8).ljust(8, b"\0"))
+            if length == 1:  # the length follows in 64 bits
+                (length,) = struct.unpack(">Q", file.read(8).ljust(8, b"\0"))
+            if length < 8:
+                return False
+            found.add(kind)
+            start += length
+    return start == size and b"moov" in found

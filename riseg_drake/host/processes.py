@@ -32,6 +32,17 @@ class Stop:
         return 128 + (self.signal or signal.SIGINT)
 
 
+@dataclass
+class _Held:
+    """Signals belong to the whole process, and so does whether they have to wait."""
+
+    depth: int = 0
+    came: bool = False
+
+
+_held = _Held()
+
+
 @contextmanager
 def stopped_by_signals(loader: str) -> Iterator[Stop]:
     """For the time of a `with`, every stop signal raises KeyboardInterrupt; the Stop says which came.
@@ -46,7 +57,10 @@ def stopped_by_signals(loader: str) -> Iterator[Stop]:
         if _is_loading(frame, loader):
             os.write(2, b"riseg: stopped\n")
             os._exit(stop.exit_code)
-        raise KeyboardInterrupt
+        if _held.depth:
+            _held.came = True
+        else:
+            raise KeyboardInterrupt
 
     before = {}
     if threading.current_thread() is threading.main_thread():  # others may not touch signals
@@ -68,12 +82,21 @@ def heed_no_more() -> None:
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """Ctrl-C waits until the end of a `with`, and is not lost; processes begun in it never hear Ctrl-C."""
+    """Stop signals wait until a `with` ends, and are not lost; processes begun in it never hear Ctrl-C."""
+    if threading.current_thread() is not threading.main_thread():  # only there they interrupt anything
+        yield
+        return
+    # The mask is what children inherit. It is not enough for this process: other threads hear the signal, too.
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    _held.depth += 1
     try:
         yield
     finally:
+        _held.depth -= 1
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if _held.came and not _held.depth:
+            _held.came = False
+            raise KeyboardInterrupt
 
 
 def end_with_parent(parent: int) -> None:
@@ -85,7 +108,7 @@ def end_with_parent(parent: int) -> None:
 
 def _is_loading(frame: FrameType | None, loader: str) -> bool:
     """Whether the outermost import that is under way was begun by a function of the file `loader`."""
-    outermost = ""
+    outermost = None
     while frame is not None:
         importer = frame.f_back
         if frame.f_code.co_filename == _IMPORT and importer and importer.f_code.co_filename != _IMPORT:
