@@ -199,7 +199,7 @@ def _own(request: SegmentRequest, name: str) -> Path | None:
     try:
         check_inside(path, None if request.follow else request.recording)
     except FileError as error:
-        raise RecordingError(f"{error}; --follow allows that") from None
+        raise layout.refusal(error) from None
     return path
 
 

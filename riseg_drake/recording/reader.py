@@ -200,7 +200,7 @@ class RecordingReader:
         try:
             kind = png_kind(path, self._inside)
         except LeadsOutError as error:
-            raise RecordingError(f"{error}; --follow allows that") from None
+            raise layout.refusal(error) from None
         except FileError:
             kind = None
         if kind is None:
@@ -215,7 +215,7 @@ class RecordingReader:
         try:
             check_inside(path, self._inside)
         except LeadsOutError as error:
-            raise RecordingError(f"{where}{error}; --follow allows that") from None
+            raise layout.refusal(error, where) from None
         except FileError:
             return  # then it cannot be read either, and is missing
 
@@ -311,7 +311,7 @@ def _read_camera(path: Path, inside: Path | None) -> tuple[Intrinsics, float]:
     except json.JSONDecodeError as error:
         raise RecordingError(f"{path}: line {error.lineno} is not JSON ({error.msg})") from None
     except FileError as error:
-        raise RecordingError(str(error)) from None
+        raise layout.refusal(error) from None
     except (ValueError, RecursionError):
         raise RecordingError(f"{path} is no JSON that can be read") from None
     try:

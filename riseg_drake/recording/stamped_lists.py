@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.host.files import FileError, LeadsOutError, read_text
-from riseg_drake.recording.layout import LeftOut, RecordingError
+from riseg_drake.host.files import FileError, read_text
+from riseg_drake.recording.layout import LeftOut, RecordingError, refusal
 
 FEW = 1 / 20
 """Share of a list that may be out of order, or whose files may be missing, and is left out; where it is
@@ -170,7 +170,5 @@ def _number(cell: str, path: Path, line: int) -> float:
 def _text(path: Path, inside: Path | None) -> str:
     try:
         return read_text(path, inside=inside)
-    except LeadsOutError as error:
-        raise RecordingError(f"{error}; --follow allows that") from None
     except FileError as error:
-        raise RecordingError(str(error)) from None
+        raise refusal(error) from None
