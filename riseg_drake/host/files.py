@@ -29,7 +29,8 @@ class LeadsOutError(FileError):
 def read_bytes(path: Path, most: int, inside: Path | None = None, *, first: int | None = None) -> bytes:
     """The content of a regular file of at most so many bytes, or only its `first` ones.
 
-    With `inside`, the file must lie in that folder once all links are followed. Raises FileError.
+    With `inside`, the file must lie in that folder once all links are followed. Raises FileError, and above all
+    MissingFileError and LeadsOutError.
     """
     check_inside(path, inside)
     try:
@@ -71,7 +72,10 @@ def is_file(path: Path) -> bool:
 
 
 def check_inside(path: Path, folder: Path | None) -> None:
-    """Raise LeadsOutError unless a path lies in the folder once all links are followed; None allows all."""
+    """Raise LeadsOutError unless a path lies in the folder once all links are followed; None allows all.
+
+    FileError where that cannot be known.
+    """
     if folder is None:
         return
     try:

@@ -68,7 +68,7 @@ def image_kind(content: bytes) -> ImageKind | None:
 
 
 def read_image(path: Path, *, jpeg: bool = False, inside: Path | None = None) -> NDArray:
-    """A whole PNG image (or JPEG, where that will do), of any size that can be; see `decode`.
+    """A whole PNG image (or JPEG, where that will do), [H, W] or [H, W, channels]; see `decode`.
 
     Raises DamagedImageError.
     """

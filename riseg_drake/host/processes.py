@@ -82,7 +82,10 @@ def heed_no_more() -> None:
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """Stop signals wait until a `with` ends, and are not lost; processes begun in it never hear Ctrl-C."""
+    """Stop signals wait until a `with` ends, and are not lost: KeyboardInterrupt is raised then.
+
+    Processes that are begun in it never hear Ctrl-C.
+    """
     if threading.current_thread() is not threading.main_thread():  # only there they interrupt anything
         yield
         return
