@@ -123,6 +123,7 @@ def command_line() -> argparse.ArgumentParser:
         "scenario", type=Path, nargs="?", metavar="SCENARIO", help="a YAML file (the built-in hardware.yaml)"
     )
     hand_eye.add_argument("--output", type=Path, metavar="DIR", help="folder for pictures (out/hand_eye)")
+    _add_overwrite(hand_eye, "check")
     hand_eye.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
 
     emulate = _add(
@@ -246,6 +247,7 @@ def command_line() -> argparse.ArgumentParser:
     pictures.add_argument(
         "--output", type=Path, default=Path("out/pictures"), metavar="DIR", help="folder (out/pictures)"
     )
+    pictures.add_argument("--overwrite", action="store_true", help="replace earlier pictures there (no)")
     pictures.add_argument(
         "--evaluation",
         type=Path,

@@ -63,7 +63,7 @@ def hand_eye(chosen: argparse.Namespace, console: Console) -> None:
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     from riseg_drake.app.hand_eye import hand_eye_command
 
-    hand_eye_command(chosen.scenario, chosen.output, chosen.yes, console)
+    hand_eye_command(chosen.scenario, chosen.output, chosen.yes, chosen.overwrite, console)
 
 
 def emulate(chosen: argparse.Namespace, console: Console) -> None:
@@ -126,4 +126,4 @@ def pictures(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg pictures`."""
     from riseg_drake.app.pictures_command import pictures_command
 
-    pictures_command(chosen.scenario, chosen.seed, chosen.output, chosen.evaluation, console)
+    pictures_command(chosen.scenario, chosen.seed, chosen.output, chosen.evaluation, chosen.overwrite, console)

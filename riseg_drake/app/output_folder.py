@@ -26,7 +26,13 @@ SUMMARY = "summary.json"
 PATIENCE = 2.0
 """How long a lock is waited for, s: one whose holder was killed is free soon."""
 
-_NOUNS = {"run": "run", "hardware": "session", "segment": "segmentation", "evaluate": "evaluation"}
+_NOUNS = {
+    "run": "run",
+    "hardware": "session",
+    "hand-eye": "check",
+    "segment": "segmentation",
+    "evaluate": "evaluation",
+}
 _STATES = {"done": "finished", "interrupted": "stopped", "failed": "failed", "running": "cut off"}
 
 

@@ -3,7 +3,7 @@
 import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -86,7 +86,15 @@ def cluster_pool(address: str, work: Work = work_on) -> Pool:
 
 
 def _parallel(work: Work, tasks: Sequence[SceneTask], jobs: int) -> Iterator[SceneOutcome]:
-    with parallel_config(backend="loky", n_jobs=jobs, inner_max_num_threads=tasks[0].threads):
+    with (
+        parallel_config(backend="loky", n_jobs=jobs, inner_max_num_threads=tasks[0].threads),
+        warnings.catch_warnings(),
+        ExitStack() as stack,
+    ):
+        # joblib replaces a process that has grown between two scenes, and ends those that nobody waits for; it
+        # wonders aloud about both.
+        warnings.filterwarnings("ignore", message="A worker stopped", category=UserWarning)
+        warnings.filterwarnings("ignore", message=".* tasks which were still being", category=UserWarning)
         try:
             with (
                 undisturbed()
@@ -94,15 +102,13 @@ def _parallel(work: Work, tasks: Sequence[SceneTask], jobs: int) -> Iterator[Sce
                 outcomes = Parallel(return_as="generator_unordered", batch_size=1)(
                     delayed(_work_below)(task, work, os.getpid()) for task in tasks
                 )
+                stack.enter_context(closing(outcomes))
         except OSError as error:
             raise PoolError(
                 f"no processes for several jobs can be started ({error.strerror}; is /dev/shm usable?); "
                 "--jobs 1 needs none"
             ) from None
-        with closing(outcomes), warnings.catch_warnings():  # ends the processes, too, if nobody wants the rest
-            # joblib replaces a process that has grown between two scenes, and wonders aloud.
-            warnings.filterwarnings("ignore", message="A worker stopped", category=UserWarning)
-            yield from outcomes
+        yield from outcomes
 
 
 def _work_below(task: SceneTask, work: Work, parent: int) -> SceneOutcome:

@@ -56,7 +56,7 @@ def read_bytes(path: Path, most: int, inside: Path | None = None, *, first: int 
 
 
 def read_text(path: Path, most: int = MOST_TEXT, inside: Path | None = None) -> str:
-    """The same for a text in UTF-8; the mark that some editors begin a file with is left out."""
+    """The same for a text in UTF-8, without the mark that some editors begin a file with. Raises FileError."""
     try:
         return read_bytes(path, most, inside).decode("utf-8-sig")
     except UnicodeDecodeError:

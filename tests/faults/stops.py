@@ -121,7 +121,14 @@ def _start(arguments: tuple[str, ...]) -> subprocess.Popen:
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=_hear_signals,
     )
+
+
+def _hear_signals() -> None:
+    """A trial in the background of a shell ignores Ctrl-C, and so would what it starts."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
 
 
 def _end(process: subprocess.Popen) -> None:
@@ -163,6 +170,8 @@ def _complaints(command: Stoppable, output: Path, right: Path, number: int, ende
         if ended.code == expected or finished
         else [f"exit code {ended.code}, not {expected}: {ended.errors}"]
     )
+    if finished:
+        print(f"{command.name}: the signal came after its end")
     lines = ended.errors.strip().splitlines()
     if number in (signal.SIGINT, signal.SIGTERM) and len(lines) != (not finished):
         complaints.append(f"{len(lines)} lines of errors: {ended.errors[-600:]}")
