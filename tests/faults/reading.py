@@ -10,11 +10,13 @@ import time
 import traceback
 from pathlib import Path
 
+from riseg_drake.host.processes import end_with_parent
 from tests.faults.readers import READERS, Reader, prepared
 
 
 def main() -> None:
     """Read the right input, then the mutated ones; say of each what became of it, a JSON object a line."""
+    end_with_parent(os.getppid())
     name, seed, first, end, place = sys.argv[1], *map(int, sys.argv[2:5]), Path(sys.argv[5])
     out = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
