@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import suppress
 from importlib.util import find_spec
@@ -16,14 +17,12 @@ from tests.faults.tally import Tally
 
 LONGEST = 10.0
 """For one input, s of the process's own time; a busy machine is not the reader's fault."""
-PATIENCE = 60.0
-"""For one input, s in all: what waits for something uses no time of its own."""
+ASLEEP = 30.0
+"""A process that waits for something all this while, s, hangs, too."""
 MOST_MEMORY = 1500
 """MB, of the whole process."""
 GROWTH = 4
 """Times the memory with the right input."""
-START = 120.0
-"""Until a process that reads has come up, s."""
 TOLD_EVERY = 500
 
 
@@ -72,13 +71,15 @@ def _cases(name: str, seed: int, first: int, end: int, place: Path) -> Iterator[
         start_new_session=True,
     )
     assert process.stdout is not None
-    now, what, wait, begun = first, "", START, False
+    now, what, begun, watch = first, "", False, _Watch(process.pid)
     rest = b""
     try:
         while True:
-            if not select.select([process.stdout], [], [], wait)[0]:
-                yield _broken(now, what, f"not done after {wait:g} s")
-                return
+            if not select.select([process.stdout], [], [], 1.0)[0]:
+                if begun and watch.hangs():
+                    yield _broken(now, what, "it hangs")
+                    return
+                continue
             read = os.read(process.stdout.fileno(), 1 << 16)
             if not read:
                 code = process.wait()
@@ -91,14 +92,38 @@ def _cases(name: str, seed: int, first: int, end: int, place: Path) -> Iterator[
             for line in lines:
                 entry = json.loads(line)
                 if "begins" in entry:
-                    now, what, wait, begun = entry["begins"], entry["what"], PATIENCE, True
+                    now, what, begun, watch = entry["begins"], entry["what"], True, _Watch(process.pid)
                     continue
-                begun, wait = False, START
+                begun = False
                 yield entry
     finally:
         with suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
+
+
+class _Watch:
+    """Looks at what a process does from now on."""
+
+    def __init__(self, pid: int):
+        self._stat = Path(f"/proc/{pid}/stat")
+        self._start = self._last = self._look()[1]
+        self._awake = time.monotonic()
+
+    def hangs(self) -> bool:
+        """Whether it has used too much time, or none for too long."""
+        state, used = self._look()
+        if state in "RD" or used > self._last:
+            self._last, self._awake = used, time.monotonic()
+        return used - self._start > LONGEST or time.monotonic() - self._awake > ASLEEP
+
+    def _look(self) -> tuple[str, float]:
+        """The state's letter, and the process's own time so far, s."""
+        try:
+            fields = self._stat.read_text().rpartition(")")[2].split()
+        except OSError:  # it has ended
+            return "R", 0.0
+        return fields[0], (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def _broken(case: int, what: str, complaint: str) -> dict:
