@@ -34,6 +34,7 @@ def command_line() -> argparse.ArgumentParser:
     _add_scenario(run)
     run.add_argument("--seed", type=int, default=0, metavar="N", help="draws the scene and the noise (0)")
     run.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/SCENARIO_seed_N)")
+    _add_overwrite(run, "run")
     run.add_argument("--record", action="store_true", help="also write every frame to DIR/recording")
     run.add_argument(
         "--meshcat",
@@ -62,6 +63,7 @@ def command_line() -> argparse.ArgumentParser:
     evaluate.add_argument(
         "--output", type=Path, metavar="DIR", help="output folder (out/evaluate_SCENARIO_seed_S)"
     )
+    _add_overwrite(evaluate, "evaluation")
     evaluate.add_argument(
         "--suite",
         choices=("films",),
@@ -130,6 +132,7 @@ def command_line() -> argparse.ArgumentParser:
         "scenario", type=Path, nargs="?", metavar="SCENARIO", help="a YAML file (the built-in hardware.yaml)"
     )
     hand_eye.add_argument("--output", type=Path, metavar="DIR", help="folder for pictures (out/hand_eye)")
+    _add_overwrite(hand_eye, "check")
     hand_eye.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
 
     emulate = _add(
@@ -174,6 +177,7 @@ def command_line() -> argparse.ArgumentParser:
     )
     segment.add_argument("recording", type=Path, metavar="RECORDING", help="its folder")
     segment.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/segment_NAME)")
+    _add_overwrite(segment, "segmentation")
     segment.add_argument(
         "--scenario",
         type=Path,
@@ -198,6 +202,10 @@ def command_line() -> argparse.ArgumentParser:
         default=0.02,
         metavar="S",
         help="how far apart in time what belongs together may be, s (0.02)",
+    )
+
+    segment.add_argument(
+        "--follow", action="store_true", help="follow links and paths that lead out of the recording (no)"
     )
 
     score = _add(
@@ -256,6 +264,7 @@ def command_line() -> argparse.ArgumentParser:
     pictures.add_argument(
         "--output", type=Path, default=Path("out/pictures"), metavar="DIR", help="folder (out/pictures)"
     )
+    pictures.add_argument("--overwrite", action="store_true", help="replace earlier pictures there (no)")
     pictures.add_argument(
         "--evaluation",
         type=Path,
@@ -297,6 +306,12 @@ def _seconds(text: str) -> float:
     if not 0 < seconds < 1e6:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds above 0")
     return seconds
+
+
+def _add_overwrite(command: argparse.ArgumentParser, earlier: str) -> None:
+    command.add_argument(
+        "--overwrite", action="store_true", help=f"remove an earlier {earlier} from the output folder (no)"
+    )
 
 
 def _add_scenario(command: argparse.ArgumentParser) -> None:

@@ -1,46 +1,63 @@
 """The command line, `riseg`: one command is run, and what is wrong is said in one line."""
 
 import os
-import select
-import sys
 from collections.abc import Sequence
 
 from rich.console import Console
 
+from riseg_drake.app import commands
 from riseg_drake.app.arguments import BAD_INPUT, command_line
-
-INTERRUPTED = 130  # 128 + SIGINT, as shells have it
+from riseg_drake.host.processes import Stop, stopped_by_signals
+from riseg_drake.host.terminal import can_write, drop_output, nobody_reads, tell_error
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns its exit code: 0 done, 2 bad input or not done, 130 interrupted."""
+    """Run one command; returns its exit code: 0 done, 2 bad input or not done, 128 and the signal's number when
+    stopped."""
     chosen = command_line().parse_args(arguments)
     # Before numpy is imported: on matrices of six by six the threads of linear algebra only wait for each
     # other, and sums that they share come out differently in their last bits.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    try:
-        chosen.call(chosen, Console())
-    except KeyboardInterrupt as stop:
-        print(f"riseg: stopped{f'; {stop}' if str(stop) else ''}", file=sys.stderr)
-        return INTERRUPTED
-    except BrokenPipeError:
-        if not _nobody_reads():
-            raise
-        # Whoever read our output has enough, as `head` does.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    except Exception as error:
-        if not isinstance(error, _mistakes()):
-            raise
-        print(f"riseg: {error}", file=sys.stderr)
-        return BAD_INPUT
+    with stopped_by_signals(commands.__file__) as stop:
+        try:
+            chosen.call(chosen, Console())
+        except KeyboardInterrupt as interrupt:
+            return _stopped(stop, f"stopped; {interrupt}" if str(interrupt) else "stopped")
+        except BrokenPipeError:
+            if not nobody_reads():
+                raise
+            # Whoever read our output has enough, as `head` does.
+            drop_output()
+        except Exception as error:
+            if stop.signal:  # what a library has made of the KeyboardInterrupt in its midst
+                return _stopped(stop, "stopped")
+            if not isinstance(error, _mistakes()):
+                raise
+            return _refused(error)
+        try:
+            can_write()
+        except OSError as error:
+            return _refused(error)
     return 0
 
 
-def _nobody_reads() -> bool:
-    """Whether the reader of our output is gone; otherwise some other pipe has broken, which is a fault."""
-    output = select.poll()
-    output.register(sys.stdout.fileno(), 0)
-    return any(events & select.POLLERR for _, events in output.poll(0))
+def _stopped(stop: Stop, words: str) -> int:
+    tell_error(words)
+    return stop.exit_code
+
+
+def _refused(error: Exception) -> int:
+    words = str(error)
+    if isinstance(error, OSError):
+        # No room, no permission, no such place: the machine refuses, wherever in the program that is noticed.
+        words = f"{error.filename or 'the output'}: {error.strerror or words}"
+    try:
+        can_write()
+    except OSError as full:
+        words = f"the output: {full.strerror}"
+        drop_output()
+    tell_error(words)
+    return BAD_INPUT
 
 
 def _mistakes() -> tuple[type[Exception], ...]:
@@ -49,10 +66,10 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.app.evaluate import EvaluationError
     from riseg_drake.app.graphics import NoGraphicsError
     from riseg_drake.app.hardware import HardwareError
-    from riseg_drake.app.output import OutputError
+    from riseg_drake.app.output_folder import OutputError
     from riseg_drake.app.run import RunStoppedError
     from riseg_drake.app.scenario_file import ScenarioError
-    from riseg_drake.app.scene_pool import ClusterError
+    from riseg_drake.app.scene_pool import PoolError
     from riseg_drake.evaluation.label_folders import LabelFolderError
     from riseg_drake.evaluation.true_things import ThingsError
     from riseg_drake.learned.model_error import ModelError
@@ -65,6 +82,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.stations.scene import SceneError
 
     return (
+        OSError,
         NoGraphicsError,
         OutputError,
         ScenarioError,
@@ -74,7 +92,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
         RecordingError,
         OwnRobotError,
         EvaluationError,
-        ClusterError,
+        PoolError,
         LcmError,
         ImageError,
         CommandError,

@@ -13,7 +13,9 @@ def run(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg run`."""
     from riseg_drake.app.run import run_command
 
-    run_command(chosen.scenario, chosen.seed, chosen.output, chosen.record, chosen.meshcat, console)
+    run_command(
+        chosen.scenario, chosen.seed, chosen.output, chosen.record, chosen.meshcat, chosen.overwrite, console
+    )
 
 
 def evaluate(chosen: argparse.Namespace, console: Console) -> None:
@@ -35,6 +37,7 @@ def evaluate(chosen: argparse.Namespace, console: Console) -> None:
         chosen.ablation,
         chosen.baseline,
         chosen.masks,
+        chosen.overwrite,
         console,
     )
 
@@ -64,7 +67,7 @@ def hand_eye(chosen: argparse.Namespace, console: Console) -> None:
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     from riseg_drake.app.hand_eye import hand_eye_command
 
-    hand_eye_command(chosen.scenario, chosen.output, chosen.yes, console)
+    hand_eye_command(chosen.scenario, chosen.output, chosen.yes, chosen.overwrite, console)
 
 
 def emulate(chosen: argparse.Namespace, console: Console) -> None:
@@ -89,6 +92,8 @@ def segment(chosen: argparse.Namespace, console: Console) -> None:
             robot=chosen.robot,
             camera_frame=chosen.camera_frame,
             stamp_limit=chosen.stamp_limit,
+            follow=chosen.follow,
+            overwrite=chosen.overwrite,
         ),
         console,
     )
@@ -127,4 +132,4 @@ def pictures(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg pictures`."""
     from riseg_drake.app.pictures_command import pictures_command
 
-    pictures_command(chosen.scenario, chosen.seed, chosen.output, chosen.evaluation, console)
+    pictures_command(chosen.scenario, chosen.seed, chosen.output, chosen.evaluation, chosen.overwrite, console)

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from riseg_drake.app.diagram import make_diagram
 from riseg_drake.app.graphics import require_graphics
-from riseg_drake.app.output import OutputError
+from riseg_drake.app.output_folder import OutputError
 from riseg_drake.app.scenario import load_scenario
 from riseg_drake.pictures.object_colors import hex_color
 from riseg_drake.recording.whole_file import write_bytes

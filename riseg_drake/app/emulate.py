@@ -20,7 +20,7 @@ from time import sleep, time
 from rich.console import Console
 
 from riseg_drake.app.graphics import require_graphics
-from riseg_drake.app.output import OutputError, to_json
+from riseg_drake.app.output_folder import OutputError, to_json
 from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.recording.whole_file import write_text

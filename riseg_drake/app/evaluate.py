@@ -1,6 +1,6 @@
 """`riseg evaluate`: many scenes, the paper's table and figure made of them."""
 
-import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -14,22 +14,24 @@ from rich.console import Console
 from riseg_drake.app.evaluation_progress import EvaluationProgress
 from riseg_drake.app.given_masks import parse_given_masks, with_given_masks
 from riseg_drake.app.graphics import require_graphics
-from riseg_drake.app.output import SUMMARY, OutputError, to_json
+from riseg_drake.app.output_folder import OutputFolder
 from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
 from riseg_drake.app.scene_folder import SceneTask, digest, is_finished, read_result
 from riseg_drake.app.scene_pool import Pool, cluster_pool, local_pool
 from riseg_drake.app.tables import score_table
 from riseg_drake.evaluation.disturbance import disturbance_of_all, disturbance_of_steps
-from riseg_drake.evaluation.figure import draw_figure
+from riseg_drake.evaluation.figure import figure_png
 from riseg_drake.evaluation.in_motion import in_motion_of_steps, mean_over_scenes
 from riseg_drake.evaluation.report import FIGURE_FILE, ending_counts, report_text
 from riseg_drake.evaluation.scene_result import OURS, SceneResult, scores_by_method, scores_by_switch
 from riseg_drake.evaluation.step_means import step_deviations, step_means
 from riseg_drake.learned.sam import load_sam
-from riseg_drake.recording.whole_file import write_text
+from riseg_drake.recording.whole_file import write_bytes, write_text
 from riseg_drake.stations.object_models import find_models
 
 REPORT = "report.md"
+PARTS = rf"scene_\d+|{re.escape(REPORT)}|{re.escape(FIGURE_FILE)}"
+"""What an evaluation puts into its folder, beside the summary."""
 
 
 class EvaluationError(ValueError):
@@ -47,6 +49,7 @@ def evaluate_command(
     ablation: bool,
     baseline: str | None,
     masks: Sequence[str],
+    overwrite: bool,
     console: Console,
 ) -> None:
     """Run what is missing of an evaluation, then write its report.
@@ -75,7 +78,7 @@ def evaluate_command(
         require_graphics()
     pool = local_pool(jobs) if dask is None else cluster_pool(dask)
     last_step = scenario.arm.most_interactions
-    results = evaluate(tasks, pool, last_step, console, given)
+    results = evaluate(tasks, pool, last_step, console, given, overwrite)
     _print_scores(results, last_step, console)
     console.print(f"report in {folder / REPORT}")
     failures = [result.failure for result in results if result.failure]
@@ -103,29 +106,43 @@ def evaluate(
     last_step: int,
     console: Console,
     given: Mapping[str, Path] | None = None,
+    overwrite: bool = False,
 ) -> list[SceneResult]:
     """Work on the scenes that are not finished yet, and write the report on all of them.
 
-    `given` are folders with masks of other methods, by name. Raises OutputError if the folder belongs to
-    something else, LabelFolderError for masks that are missing; KeyboardInterrupt says how far it came.
+    `given` are folders with masks of other methods, by name; with `overwrite` an earlier evaluation is
+    removed first. Raises OutputError if the folder belongs to something else, or nothing can be written,
+    LabelFolderError for masks that are missing; KeyboardInterrupt says how far it came.
     """
-    folder = tasks[0].folder.parent
-    about = _claim(folder, tasks)
+    with _claimed(tasks, overwrite) as folder:
+        return _evaluate(folder, tasks, pool, last_step, console, given or {})
+
+
+def _evaluate(
+    folder: OutputFolder,
+    tasks: Sequence[SceneTask],
+    pool: Pool,
+    last_step: int,
+    console: Console,
+    given: Mapping[str, Path],
+) -> list[SceneResult]:
     todo = [task for task in tasks if not is_finished(task)]
     failures: dict[Path, str] = {}
-    console.print(_plan(tasks, todo, folder))
+    console.print(_plan(tasks, todo, folder.path))
     with (
-        _interruption_told(folder, about, tasks),
+        _interruption_told(folder, tasks),
         EvaluationProgress(len(tasks), len(tasks) - len(todo), console) as progress,
     ):
         for outcome in pool(todo):
             failures[outcome.task.folder] = outcome.failure
             progress.tell(read_result(outcome.task, outcome.failure), outcome.seconds)
     results = [read_result(task, failures.get(task.folder, "")) for task in tasks]
-    results = with_given_masks(results, tasks, given or {})
-    write_text(folder / REPORT, report_text(results, _about_text(about, tasks), last_step))
-    draw_figure(results, last_step, folder / FIGURE_FILE)
-    write_text(folder / SUMMARY, to_json({**about, "state": "done", **_figures(results, last_step)}))
+    results = with_given_masks(results, tasks, given)
+    about = _about_text(folder.summary["riseg_drake"], tasks)
+    with folder.writing():
+        write_text(folder.path / REPORT, report_text(results, about, last_step))
+        write_bytes(folder.path / FIGURE_FILE, figure_png(results, last_step))
+    folder.note(state="done", **_figures(results, last_step))
     return results
 
 
@@ -136,36 +153,34 @@ def _require_sam(scenario: Scenario) -> None:
     load_sam(Path(scenario.sam.folder), scenario.sam.device)
 
 
-def _claim(folder: Path, tasks: Sequence[SceneTask]) -> dict[str, Any]:
-    """Make the folder, or make sure that it is this evaluation's; returns what its summary begins with."""
+def _claimed(tasks: Sequence[SceneTask], overwrite: bool) -> OutputFolder:
+    """The evaluation's folder, new or to be gone on with. Raises OutputError."""
     settings = {**tasks[0].settings, "ablation": tasks[0].ablation}
-    about = {"evaluation": settings, "scenes": len(tasks), "riseg_drake": version("riseg-drake")}
-    if folder.exists() and not folder.is_dir():
-        raise OutputError(f"{folder} is a file; give a folder for the output")
-    try:
-        if folder.is_dir() and any(folder.iterdir()):
-            _require_same(folder, settings)
-        folder.mkdir(parents=True, exist_ok=True)
-        write_text(folder / SUMMARY, to_json({**about, "state": "running"}))
-    except OSError as error:
-        raise OutputError(f"cannot write to {folder}: {error.strerror}") from None
-    return about
+    about = {
+        "evaluation": settings,
+        "scenes": len(tasks),
+        "riseg_drake": version("riseg-drake"),
+        "state": "running",
+    }
+    return OutputFolder(
+        tasks[0].folder.parent,
+        "evaluate",
+        PARTS,
+        about,
+        overwrite=overwrite,
+        goes_on=lambda earlier: _difference(earlier.get("evaluation"), settings),
+    )
 
 
-def _require_same(folder: Path, settings: Mapping[str, Any]) -> None:
-    try:
-        earlier = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))["evaluation"]
-    except (OSError, ValueError, KeyError, TypeError):
-        raise OutputError(
-            f"{folder} is not empty and holds no earlier evaluation; give a new folder, or an empty one"
-        ) from None
+def _difference(earlier: Any, settings: Mapping[str, Any]) -> str:
+    """Why an earlier evaluation is not this one; empty if it is."""
+    if not isinstance(earlier, dict):
+        return "whose settings are unknown"
     if earlier.get("seed") != settings["seed"]:
-        what = f"begins with seed {earlier.get('seed')}, not {settings['seed']}"
-    elif earlier.get("scenario_sha256") != settings["scenario_sha256"]:
-        what = "has other settings (scenario or objects)"
-    else:
-        return
-    raise OutputError(f"{folder} holds another evaluation, which {what}; give a new folder with --output")
+        return f"which begins with seed {earlier.get('seed')}, not {settings['seed']}"
+    if earlier.get("scenario_sha256") != settings["scenario_sha256"]:
+        return "which has other settings (scenario or objects)"
+    return ""
 
 
 def _plan(tasks: Sequence[SceneTask], todo: Sequence[SceneTask], folder: Path) -> str:
@@ -180,23 +195,23 @@ def _count(scenes: int) -> str:
 
 
 @contextmanager
-def _interruption_told(folder: Path, about: Mapping[str, Any], tasks: Sequence[SceneTask]) -> Iterator[None]:
+def _interruption_told(folder: OutputFolder, tasks: Sequence[SceneTask]) -> Iterator[None]:
     """After Ctrl-C, say what is there and how to go on."""
     try:
         yield
     except KeyboardInterrupt:
-        write_text(folder / SUMMARY, to_json({**about, "state": "interrupted"}))
+        folder.note(state="interrupted")
         done = sum(map(is_finished, tasks))
         raise KeyboardInterrupt(
             f"{done} of {len(tasks)} scenes are finished; the same command goes on from there"
         ) from None
 
 
-def _about_text(about: Mapping[str, Any], tasks: Sequence[SceneTask]) -> dict[str, object]:
+def _about_text(program: str, tasks: Sequence[SceneTask]) -> dict[str, object]:
     return {
         "scenes": f"{len(tasks)}, seeds {tasks[0].seed} to {tasks[-1].seed}",
         "scenario": f"{tasks[0].scenario_name} (SHA-256 {digest(tasks[0].scenario)[:12]})",
-        "riseg_drake": about["riseg_drake"],
+        "riseg_drake": program,
     }
 
 

@@ -16,7 +16,8 @@ from rich.progress import track
 
 from riseg_drake.app.depth_figures import DEPTH_PICTURE, depth_figures, depth_table, draw_depth
 from riseg_drake.app.graphics import require_graphics
-from riseg_drake.app.output import RECORDING, SUMMARY, OutputError, to_json
+from riseg_drake.app.output import RECORDING
+from riseg_drake.app.output_folder import SUMMARY, OutputError, to_json
 from riseg_drake.app.recorded_view import recorded_view
 from riseg_drake.app.replay import Replay
 from riseg_drake.app.scenario import load_scenario

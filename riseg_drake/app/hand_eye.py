@@ -7,6 +7,7 @@ from rich.console import Console
 
 from riseg_drake.app.arm_travel import straight_motion, travel
 from riseg_drake.app.hardware import HardwareError, check_limits, listening, wait_for_drivers
+from riseg_drake.app.output_folder import OutputFolder
 from riseg_drake.app.planned_speed import planned_limits
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
@@ -21,20 +22,27 @@ from riseg_drake.stations.command_process import CommandProcess
 from riseg_drake.stations.hardware import HardwareCameraConfig, HardwareStationConfig, newest_sight
 from riseg_drake.stations.lcm_reception import Reception
 
+PARTS = r"flow_\d+\.png"
+"""What the check puts into its folder, beside the summary."""
 OFFSETS = ((0.04, 0.0, 0.0), (0.0, 0.04, 0.1), (-0.04, 0.0, 0.0), (0.0, -0.04, -0.1), (0.0, 0.0, 0.0))
 """Where the tip goes from the observation posture, x and y in W, m, and by how much it turns, rad."""
 SLOWER = 0.3
 """The arm moves at this share of the speed of other planned motions."""
 
 
-def hand_eye_command(scenario_file: Path | None, output: Path | None, yes: bool, console: Console) -> None:
-    """Move, compare the flows, print the verdict, and leave pictures. Raises HardwareError."""
+def hand_eye_command(
+    scenario_file: Path | None, output: Path | None, yes: bool, overwrite: bool, console: Console
+) -> None:
+    """Move, compare the flows, print the verdict, and leave it with pictures. Raises HardwareError."""
     scenario = load_scenario(scenario_file, HARDWARE)
     config = scenario.hardware
     check_limits(scenario)
     kinematics = PandaKinematics(config.panda)
     postures = _postures(kinematics, config)
     limits = planned_limits(scenario)
+    folder = OutputFolder(
+        output or Path("out") / "hand_eye", "hand-eye", PARTS, {"state": "running"}, overwrite=overwrite
+    )
     operator = TerminalOperator(console, yes)
     with listening(config, replayed=False, truth=False) as (reception, _):
         with console.status("waiting for arm and camera") as status:
@@ -59,10 +67,9 @@ def hand_eye_command(scenario_file: Path | None, output: Path | None, yes: bool,
         )
     median, words = verdict(errors)
     shift_u, shift_v = np.median([error.mean for error in errors], axis=0)
-    folder = output or Path("out") / "hand_eye"
-    folder.mkdir(parents=True, exist_ok=True)
-    for index, error in enumerate(errors[:: max(len(errors) // 5, 1)]):
-        write_png(folder / f"flow_{index}.png", draw_flow_error(error))
+    with folder.writing():
+        for index, error in enumerate(errors[:: max(len(errors) // 5, 1)]):
+            write_png(folder.path / f"flow_{index}.png", draw_flow_error(error))
     plane_W = objects_above_table(camera.frames[-1], scenario.above_table).plane_W
     tilt = np.degrees(np.arccos(np.clip(plane_W[2], -1, 1)))
     console.print(
@@ -73,7 +80,15 @@ def hand_eye_command(scenario_file: Path | None, output: Path | None, yes: bool,
         f"table: {-1e3 * plane_W[3]:.1f} mm high and tilted by {tilt:.2f} degrees in the arm's base frame; "
         "both should be near 0"
     )
-    console.print(f"arrows of both flows in {folder}: expected blue, observed orange")
+    folder.note(
+        state="done",
+        pairs=len(errors),
+        median_px=round(median, 3),
+        shift_px=[round(float(shift_u), 3), round(float(shift_v), 3)],
+        table_height_mm=round(-1e3 * float(plane_W[3]), 2),
+        table_tilt_deg=round(float(tilt), 3),
+    )
+    console.print(f"arrows of both flows in {folder.path}: expected blue, observed orange")
 
 
 class _Collector:

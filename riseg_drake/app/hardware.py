@@ -82,6 +82,7 @@ def hardware_command(
     folder = RunFolder(
         output or Path("out") / f"{name}_{time.strftime('%Y%m%d_%H%M%S')}",
         {"scenario": name, "seed": seed, "dry_run": dry_run},
+        command="hardware",
     )
     console.print(f"{name}, results in {folder.path}")
     browser = StartMeshcat() if meshcat or dry_run else None

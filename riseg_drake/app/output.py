@@ -7,8 +7,6 @@
 Whenever the run is stopped, every step that the summary lists is there, and whole.
 """
 
-import json
-import math
 import re
 import shutil
 from collections.abc import Mapping, Sequence
@@ -19,20 +17,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.app.output_folder import OutputFolder
 from riseg_drake.evaluation.disturbance import Disturbance
 from riseg_drake.evaluation.in_motion import InMotion
 from riseg_drake.evaluation.scores import Scores
+from riseg_drake.host.processes import undisturbed
 from riseg_drake.pictures.masks import draw_masks
-from riseg_drake.recording.whole_file import write_png, write_text
+from riseg_drake.recording.whole_file import write_png
 from riseg_drake.recording.writer import depth_to_millimetres
 
-SUMMARY = "summary.json"
 RECORDING = "recording"
 REPLAY = "replay.html"
-
-
-class OutputError(ValueError):
-    """Why nothing can be written to an output folder, in one line."""
+PARTS = rf"\.?step_\d+(\.unfinished)?|{RECORDING}|export|{re.escape(REPLAY)}"
+"""What a run puts into its folder, beside the summary."""
 
 
 @dataclass(frozen=True)
@@ -70,76 +67,61 @@ class Step:
 
 
 class RunFolder:
-    """Writes the steps of one run. What an earlier run left in the folder is removed first.
+    """Writes the steps of one run into a folder of its own; see OutputFolder for what it may be.
 
-    Raises OutputError if the folder holds anything else than an earlier run.
+    Raises OutputError if the folder holds anything else, where it cannot be written, or the disk is full.
     """
 
-    def __init__(self, folder: Path, about: Mapping[str, Any]):
+    def __init__(
+        self, folder: Path, about: Mapping[str, Any], *, command: str = "run", overwrite: bool = False
+    ):
         self.path = folder
-        self._summary: dict[str, Any] = {**about, "state": "running", "steps": []}
-        if folder.exists() and not folder.is_dir():
-            raise OutputError(f"{folder} is a file; give a folder for the output")
-        if folder.is_dir() and not (folder / SUMMARY).exists() and not all(map(_is_own, folder.iterdir())):
-            raise OutputError(
-                f"{folder} is not empty and holds no earlier run; give a new folder, or an empty one"
-            )
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            self._remove_earlier_run()
-            self._write_summary()
-        except OSError as error:
-            raise OutputError(f"cannot write to {folder}: {error.strerror}") from None
+        about = {**about, "state": "running", "steps": []}
+        self._folder = OutputFolder(folder, command, PARTS, about, overwrite=overwrite)
 
     def write_step(self, step: Step) -> None:
         """Write one step's pictures, then enter it in the summary."""
         name = f"step_{step.interaction_step}"
         unfinished = self.path / f".{name}.unfinished"
-        unfinished.mkdir()
-        write_png(unfinished / "color.png", step.color)
-        write_png(unfinished / "depth.png", depth_to_millimetres(step.depth))
-        write_png(unfinished / "mask.png", step.mask.astype(np.uint16))
-        write_png(unfinished / "overlay.png", draw_masks(step.color, step.mask))
-        if step.ground_truth is not None:
-            write_png(unfinished / "ground_truth.png", step.ground_truth.astype(np.uint16))
-        unfinished.rename(self.path / name)
-        self._summary["steps"].append(_step_to_json(step))
-        self._write_summary()
+        with self._folder.writing():
+            unfinished.mkdir()
+            try:
+                write_png(unfinished / "color.png", step.color)
+                write_png(unfinished / "depth.png", depth_to_millimetres(step.depth))
+                write_png(unfinished / "mask.png", step.mask.astype(np.uint16))
+                write_png(unfinished / "overlay.png", draw_masks(step.color, step.mask))
+                if step.ground_truth is not None:
+                    write_png(unfinished / "ground_truth.png", step.ground_truth.astype(np.uint16))
+                with undisturbed():
+                    unfinished.rename(self.path / name)
+                    self.note(steps=[*self._folder.summary["steps"], _step_to_json(step)])
+            finally:
+                shutil.rmtree(unfinished, ignore_errors=True)
 
     def write_refined(self, step: Step) -> None:
         """Add the mask with sharper outlines to a step that was written before."""
         assert step.refined_mask is not None
         folder = self.path / f"step_{step.interaction_step}"
-        write_png(folder / "refined.png", step.refined_mask.astype(np.uint16))
-        (entry,) = (e for e in self._summary["steps"] if e["step"] == step.interaction_step)
+        with self._folder.writing():
+            write_png(folder / "refined.png", step.refined_mask.astype(np.uint16))
+        entries = self._folder.summary["steps"]
+        (entry,) = (e for e in entries if e["step"] == step.interaction_step)
         entry.update(_step_to_json(step))
-        self._write_summary()
+        self.note()
 
     def note(self, **entries: Any) -> None:
         """Enter something about the whole run."""
-        self._summary.update(entries)
-        self._write_summary()
+        self._folder.note(**entries)
 
-    def _write_summary(self) -> None:
-        write_text(self.path / SUMMARY, to_json(self._summary))
+    def close(self) -> None:
+        """Let others write there."""
+        self._folder.close()
 
-    def _remove_earlier_run(self) -> None:
-        # The summary goes first: what it lists must be there at any moment.
-        (self.path / SUMMARY).unlink(missing_ok=True)
-        (self.path / REPLAY).unlink(missing_ok=True)
-        for entry in self.path.iterdir():
-            if _is_own(entry):
-                shutil.rmtree(entry)
+    def __enter__(self) -> "RunFolder":
+        return self
 
-
-def _is_own(entry: Path) -> bool:
-    """Whether a run made this folder; one that was cut off while it cleared up leaves some of them."""
-    return bool(re.fullmatch(rf"\.?step_\d+(\.unfinished)?|{RECORDING}", entry.name)) and entry.is_dir()
-
-
-def to_json(content: Any) -> str:
-    """JSON text; NaN and infinity, which JSON does not have, become null."""
-    return json.dumps(_finite(content), indent=2) + "\n"
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
 
 def stage_figures(seconds: Mapping[str, Sequence[float]]) -> dict[str, dict[str, float]]:
@@ -172,14 +154,4 @@ def _step_to_json(step: Step) -> dict[str, Any]:
     if step.disturbance is not None:
         content["pushed"] = step.disturbance.pushed
         content["motions"] = {name: asdict(motion) for name, motion in step.disturbance.motions.items()}
-    return content
-
-
-def _finite(content: Any) -> Any:
-    if isinstance(content, Mapping):
-        return {key: _finite(value) for key, value in content.items()}
-    if isinstance(content, list | tuple):
-        return [_finite(value) for value in content]
-    if isinstance(content, float) and not math.isfinite(content):
-        return None
     return content

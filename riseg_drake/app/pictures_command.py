@@ -18,7 +18,8 @@ from riseg_drake.app.diagram import make_diagram
 from riseg_drake.app.drawing import draw, render, require_dot
 from riseg_drake.app.film import film_run
 from riseg_drake.app.graphics import require_graphics
-from riseg_drake.app.output import OutputError, Step
+from riseg_drake.app.output import Step
+from riseg_drake.app.output_folder import OutputError
 from riseg_drake.app.scenario import BUILT_IN, HARDWARE, load_scenario
 from riseg_drake.evaluation.report import FIGURE_FILE
 from riseg_drake.geometry.camera import WHOLE, bounding_region
@@ -26,6 +27,13 @@ from riseg_drake.pictures.animation import gif
 from riseg_drake.pictures.masks import draw_masks
 from riseg_drake.recording.whole_file import write_bytes
 
+NAMES = (
+    "run.gif",
+    "run.jpg",
+    f"{BUILT_IN}_diagram.svg",
+    f"{HARDWARE}_diagram.svg",
+    "evaluation.png",
+)
 RATE = 12.5
 """Of the film, pictures a second; it runs about three times as fast as the robot."""
 LAST = 2.0
@@ -36,11 +44,19 @@ STRIP_GAP, STRIP_MARGIN = 5, 30
 
 
 def pictures_command(
-    scenario_file: Path | None, seed: int, output: Path, evaluation: Path | None, console: Console
+    scenario_file: Path | None,
+    seed: int,
+    output: Path,
+    evaluation: Path | None,
+    overwrite: bool,
+    console: Console,
 ) -> None:
     """Make the pictures of a run, of the wired diagrams and of an evaluation. Raises OutputError."""
     scenario = load_scenario(scenario_file)
     _ = scenario.simulated  # says so where it is not
+    earlier = [] if overwrite else [str(output / name) for name in NAMES if (output / name).exists()]
+    if earlier:
+        raise OutputError(f"{', '.join(earlier)} would be replaced; give another folder, or --overwrite")
     require_graphics()
     require_dot()
     pictures: dict[str, bytes] = {}

@@ -4,11 +4,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from riseg_drake.app.scenario import Scenario
+from riseg_drake.host.model_files import ModelFileError, check_model
+from riseg_drake.host.terminal import one_line
 from riseg_drake.recording import layout
 from riseg_drake.recording.layout import RecordingError
 from riseg_drake.recording.reader import RecordingReader
 from riseg_drake.robot.kinematics import PandaKinematics
-from riseg_drake.robot.own_robot import OwnRobot
+from riseg_drake.robot.own_robot import OwnRobot, OwnRobotError
 from riseg_drake.robot.silhouette import Kinematics, RobotSilhouette, UnknownShapeError
 from riseg_drake.systems.frame_view import FrameView
 
@@ -69,7 +71,13 @@ def _kinematics(
 ) -> Kinematics:
     assert reader.joints is not None
     if robot is not None:
-        return OwnRobot(robot, camera_frame, reader.joints.names or [""] * number)
+        try:
+            check_model(robot)
+            return OwnRobot(robot, camera_frame, reader.joints.names or [""] * number)
+        except ModelFileError as error:
+            raise OwnRobotError(f"{robot}: {error}; --robot names a URDF or SDF file") from None
+        except SystemExit as error:  # one of Drake's assertions
+            raise OwnRobotError(f"{robot}: {one_line(error)}") from None
     if number != PANDA_JOINTS:
         raise RecordingError(
             f"{reader.joints.path}: line {reader.joints.lines[0]} holds {number} joint angles, the Panda has "

@@ -3,7 +3,7 @@
 import resource
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
@@ -18,12 +18,15 @@ from riseg_drake.app.diagram import WiredDiagram, make_diagram
 from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.interactions import Listener, Progress, interactions, simulated_truth
 from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step, stage_figures
+from riseg_drake.app.output_folder import OutputError
 from riseg_drake.app.run_recording import recording_of
 from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
 from riseg_drake.app.tables import score_table, stage_table
 from riseg_drake.evaluation.in_motion import pooled
 from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.host.processes import undisturbed
+from riseg_drake.host.terminal import one_line
 from riseg_drake.recording.whole_file import write_text
 from riseg_drake.systems.mask_refiner import NO_REFINED_MASK, RefinedMask
 from riseg_drake.systems.stage_clock import StageClock
@@ -35,6 +38,7 @@ def run_command(
     output: Path | None,
     record: bool,
     meshcat: bool,
+    overwrite: bool,
     console: Console,
 ) -> None:
     """Run one scene, tell how it goes, and show the scores of every interaction."""
@@ -42,11 +46,12 @@ def run_command(
     _ = scenario.simulated  # says so where it is not
     require_graphics()
     name = scenario_name(scenario_file)
-    folder = RunFolder(output or Path("out") / f"{name}_seed_{seed}", {"scenario": name, "seed": seed})
-    console.print(f"{name}, seed {seed}, results in {folder.path}")
-    browser = StartMeshcat() if meshcat else None
-    with console.status("placing the objects") as status:
-        steps = run(scenario, seed, folder, record, browser, Narrator(console, status))
+    path, about = output or Path("out") / f"{name}_seed_{seed}", {"scenario": name, "seed": seed}
+    with RunFolder(path, about, overwrite=overwrite) as folder:
+        console.print(f"{name}, seed {seed}, results in {folder.path}")
+        browser = StartMeshcat() if meshcat else None
+        with console.status("placing the objects") as status:
+            steps = run(scenario, seed, folder, record, browser, Narrator(console, status))
     report(steps, console)
 
 
@@ -171,14 +176,16 @@ def state_of(folder: RunFolder, progress: Progress, steps: list[Step]) -> Iterat
     try:
         yield
     except KeyboardInterrupt:
-        finish("interrupted", "stopped by the user")
+        with undisturbed():
+            finish("interrupted", "stopped by the user")
         finished = f"{len(steps)} finished step{'' if len(steps) == 1 else 's'}"
         raise KeyboardInterrupt(f"{finished} in {folder.path}") from None
     except RunStoppedError as stop:
         finish("stopped", str(stop))
         raise
     except Exception as error:
-        finish("failed", " ".join(str(error).split()))
+        with suppress(OutputError):  # where the disk is full
+            finish("failed", one_line(error))
         raise
     finish("done", progress.end)
 

@@ -19,7 +19,14 @@ from typing import Any, TypeVar
 import yaml
 from pydrake.common.yaml import yaml_load_typed
 
+from riseg_drake.host.files import MOST_SETTINGS, FileError, MissingFileError, read_text
+from riseg_drake.host.terminal import one_line
+
 Schema = TypeVar("Schema")
+
+
+DEEPEST = 32
+"""Blocks and lists in each other."""
 
 
 class ScenarioError(ValueError):
@@ -32,17 +39,18 @@ def read_scenario(path: Path, schema: type[Schema]) -> Schema:
     Raises ScenarioError: missing file, no YAML, unknown key, value of the wrong type or out of bounds.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
+        text = read_text(path, MOST_SETTINGS)
+    except MissingFileError:
         raise ScenarioError(f"{path} is not there{_nearest_file(path)}") from None
-    except (OSError, UnicodeDecodeError):
-        raise ScenarioError(f"{path} is not a readable text file; a scenario is a YAML file") from None
+    except FileError as error:
+        raise ScenarioError(f"{error}; a scenario is a YAML file") from None
     return parse_scenario(text, schema, source=str(path))
 
 
 def parse_scenario(text: str, schema: type[Schema], source: str) -> Schema:
     """The same for a text; `source` names it in errors. Raises ScenarioError."""
     try:
+        _check_plain(text, source)
         node = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.MarkedYAMLError as error:
         line = f" line {error.problem_mark.line + 1}:" if error.problem_mark else ""
@@ -54,8 +62,8 @@ def parse_scenario(text: str, schema: type[Schema], source: str) -> Schema:
     _check(node, schema, name="the scenario", source=source)
     try:
         loaded = yaml_load_typed(schema=schema, data=text, defaults=schema())
-    except (RuntimeError, ValueError, TypeError) as error:
-        raise ScenarioError(f"{source}: {' '.join(str(error).split())}") from None
+    except Exception as error:  # the loader's, YAML's own, and those of whatever a tag or a number asks for
+        raise ScenarioError(f"{source}: {one_line(error)}") from None
     for complaint in _complaints(loaded):
         raise ScenarioError(f"{source}: line {_line(node, complaint)}: {complaint}")
     return loaded
@@ -102,9 +110,29 @@ def _line(node: yaml.Node, complaint: str) -> int:
     return line + 1
 
 
+def _check_plain(text: str, source: str) -> None:
+    """Raise ScenarioError for YAML that no scenario needs; reads no further than to the first of it.
+
+    Brackets in brackets cost time by their square, and memory of the stack; directives change what tags mean.
+    """
+    depth = 0
+    for event in yaml.parse(text, Loader=yaml.SafeLoader):
+        line = event.start_mark.line + 1
+        if isinstance(event, yaml.DocumentStartEvent) and (event.version or event.tags):
+            raise ScenarioError(f"{source}: line {line}: a scenario has no directives (%YAML, %TAG)")
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+        if depth > DEEPEST:
+            raise ScenarioError(f"{source}: line {line}: nothing in a scenario is nested so deeply")
+
+
 def _check(node: yaml.Node, schema: Any, name: str, source: str) -> None:
     """Raise ScenarioError if a YAML node does not fit the schema of its field."""
     where = f"{source}: line {node.start_mark.line + 1}:"
+    if not node.tag.startswith(("!", "tag:yaml.org,2002:")) or node.tag.startswith(_OF_PYTHON):
+        raise ScenarioError(f"{where} {name} has the unknown tag {node.tag}")
     schema = _variant(_without_none(schema, node), node, name, where)
     if schema is None:
         return
@@ -157,9 +185,14 @@ def _without_none(schema: Any, node: yaml.Node) -> Any:
     return typing.Union[tuple(rest)]  # noqa: UP007  (of a number of types that is known only here)
 
 
+_OF_PYTHON = "tag:yaml.org,2002:python"
+
+
 def _variant(schema: Any, node: yaml.Node, name: str, where: str) -> Any:
     """Of a choice between dataclasses the one that a tag such as !Name asks for; the first without a tag."""
     if typing.get_origin(schema) not in (typing.Union, types.UnionType):
+        if node.tag.startswith("!"):
+            raise ScenarioError(f"{where} {name} has the unknown tag {node.tag}")
         return schema
     variants = {f"!{choice.__name__}": choice for choice in typing.get_args(schema)}
     if not node.tag.startswith("!"):
@@ -195,7 +228,7 @@ def _nearest_file(path: Path) -> str:
     """A hint at a file of nearly the same name beside the one that is missing."""
     try:
         names = [entry.name for entry in path.parent.iterdir() if entry.suffix in (".yaml", ".yml")]
-    except OSError:
+    except (OSError, ValueError):
         return f"; nor is the folder {path.parent}"
     near = difflib.get_close_matches(path.name, names, n=1)
     return f"; did you mean {path.parent / near[0]}?" if near else ""

@@ -11,6 +11,7 @@ from riseg_drake.evaluation.baselines import BASELINES, BaselineParameters
 from riseg_drake.evaluation.label_folders import read_labels
 from riseg_drake.evaluation.scores import Scores, score
 from riseg_drake.geometry.rgbd import Frame, sanitize_depth
+from riseg_drake.host.images import read_image
 from riseg_drake.recording.layout import MILLIMETRES
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.robot.silhouette import RobotSilhouette
@@ -45,7 +46,7 @@ class ObservationView:
 
     def read(self, step: Path) -> Frame:
         """The frame whose colour and depth are in the folder of a step."""
-        color = cv2.cvtColor(cv2.imread(str(step / "color.png"), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
+        color = cv2.cvtColor(read_image(step / "color.png"), cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
         depth = read_labels(step / "depth.png") / MILLIMETRES
         return Frame(0, 0.0, self._intrinsics, color, sanitize_depth(depth), self._X_WC, self._robot)
 

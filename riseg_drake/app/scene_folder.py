@@ -7,14 +7,15 @@ scene_003/
 """
 
 import hashlib
-import json
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from riseg_drake.app.ablation import versions
-from riseg_drake.app.output import RECORDING, SUMMARY, to_json
+from riseg_drake.app.output import RECORDING
+from riseg_drake.app.output_folder import SUMMARY, read_json, to_json
 from riseg_drake.evaluation.baselines import BASELINES
 from riseg_drake.evaluation.disturbance import Disturbance, ObjectMotion
 from riseg_drake.evaluation.in_motion import InMotion
@@ -79,19 +80,20 @@ def run_is_usable(task: SceneTask) -> bool:
 
 def missing_baselines(task: SceneTask) -> set[str]:
     """The methods that have no scores yet."""
-    return set(task.baselines) - set(read_json(task.folder / BASELINE_FILE))
+    return set(task.baselines) - set(_scores_from_json(read_json(task.folder / BASELINE_FILE)))
 
 
 def ablation_is_finished(task: SceneTask) -> bool:
     """Whether every version that there is to compare has its scores."""
-    return set(read_json(task.folder / ABLATION_FILE).get("scores", {})) == set(versions())
+    return set(_scores_from_json(read_json(task.folder / ABLATION_FILE).get("scores"))) == set(versions())
 
 
 def note_death(task: SceneTask, failure: str) -> None:
     """Say in a scene's summary that its process died, since that could not."""
     summary = read_json(task.folder / SUMMARY) or {**task.settings, "steps": []}
     task.folder.mkdir(parents=True, exist_ok=True)
-    write_text(task.folder / SUMMARY, to_json({**summary, "state": "failed", "end": failure}))
+    content = {"command": "run", **summary, "state": "failed", "end": failure}
+    write_text(task.folder / SUMMARY, to_json(content))
 
 
 def has_begun(task: SceneTask) -> bool:
@@ -104,8 +106,12 @@ def read_result(task: SceneTask, failure: str = "") -> SceneResult:
     summary = read_json(task.folder / SUMMARY)
     end = str(summary.get("end", "it did not begin"))
     ablation = read_json(task.folder / ABLATION_FILE) if task.ablation else {}
-    steps = summary.get("steps", [])
     baselines = _scores_from_json(read_json(task.folder / BASELINE_FILE))
+    try:
+        scores, disturbances, in_motion = _figures_of_steps(summary)
+    except _DAMAGED:
+        scores, disturbances, in_motion, summary = [], [], [], {}
+        end = f"{task.folder / SUMMARY} is damaged"
     return SceneResult(
         name=task.folder.name,
         seed=task.seed,
@@ -113,28 +119,39 @@ def read_result(task: SceneTask, failure: str = "") -> SceneResult:
         end=end,
         ended=summary.get("ended") or "",
         unsettled_area_m2=_number(summary.get("unsettled_area_m2")),
-        scores=[Scores.from_dict(step["scores"]) for step in steps],
-        disturbances=[_disturbance(step) for step in steps[1:]],
-        in_motion=[_in_motion(step.get("in_motion")) for step in steps[1:]],
+        scores=scores,
+        disturbances=disturbances,
+        in_motion=in_motion,
         baselines={name: baselines[name] for name in task.baselines if name in baselines},
-        ablation=_scores_from_json(ablation.get("scores", {})),
-        ablation_failures=ablation.get("failures", {}),
+        ablation=_scores_from_json(ablation.get("scores")),
+        ablation_failures=_texts(ablation.get("failures")),
     )
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """The content of a file; empty if it is not there, or nobody can read it."""
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return content if isinstance(content, dict) else {}
 
 
 def _run_is_finished(task: SceneTask) -> bool:
     summary = read_json(task.folder / SUMMARY)
     same = all(summary.get(key) == task.settings[key] for key in ("scenario_sha256", "seed"))
+    try:
+        _figures_of_steps(summary)
+    except _DAMAGED:
+        return False
     return same and summary.get("state") == "done"
+
+
+_DAMAGED = (KeyError, TypeError, ValueError, AttributeError)
+"""What comes of a file of results that somebody or something has changed."""
+
+
+def _figures_of_steps(
+    summary: Mapping[str, Any],
+) -> tuple[list[Scores], list[Disturbance], list[InMotion | None]]:
+    """The scores of all steps, what each interaction did, and the masks meanwhile. Raises one of _DAMAGED."""
+    steps = summary.get("steps", [])
+    return (
+        [Scores.from_dict(step["scores"]) for step in steps],
+        [_disturbance(step) for step in steps[1:]],
+        [_in_motion(step.get("in_motion")) for step in steps[1:]],
+    )
 
 
 def _disturbance(step: Mapping[str, Any]) -> Disturbance:
@@ -153,5 +170,14 @@ def _number(value: float | None) -> float:
     return float("nan") if value is None else float(value)
 
 
-def _scores_from_json(content: Mapping[str, Any]) -> dict[str, list[Scores]]:
-    return {name: [Scores.from_dict(each) for each in steps] for name, steps in content.items()}
+def _scores_from_json(content: Any) -> dict[str, list[Scores]]:
+    """The scores of each method whose entry can be read."""
+    scores = {}
+    for name, steps in content.items() if isinstance(content, Mapping) else ():
+        with suppress(*_DAMAGED):
+            scores[name] = [Scores.from_dict(each) for each in steps]
+    return scores
+
+
+def _texts(content: Any) -> dict[str, str]:
+    return {str(k): str(v) for k, v in content.items()} if isinstance(content, Mapping) else {}

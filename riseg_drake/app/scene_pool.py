@@ -1,10 +1,9 @@
 """Many scenes at once: in processes of this machine, or on a Dask cluster. The scene is the unit of work."""
 
-import signal
-import threading
+import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,13 +15,14 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 from riseg_drake.app.output import RECORDING
 from riseg_drake.app.scene_folder import SceneTask, has_begun, note_death
 from riseg_drake.app.scene_work import SceneOutcome, work_on
+from riseg_drake.host.processes import end_with_parent, undisturbed
 from riseg_drake.recording.whole_file import write_bytes
 
 Work = Callable[[SceneTask], SceneOutcome]
 
 
-class ClusterError(ValueError):
-    """Why a Dask cluster cannot be used, in one line."""
+class PoolError(ValueError):
+    """Why processes, or a Dask cluster, cannot be used, in one line."""
 
 
 class Pool(Protocol):
@@ -58,16 +58,16 @@ def local_pool(jobs: int, work: Work = work_on) -> Pool:
 def cluster_pool(address: str, work: Work = work_on) -> Pool:
     """A running Dask cluster. Its workers need riseg_drake installed, but none of our folders.
 
-    Raises ClusterError if Dask is not installed or nobody answers at the address.
+    Raises PoolError if Dask is not installed or nobody answers at the address.
     """
     try:
         from distributed import Client
     except ImportError:
-        raise ClusterError("--dask needs Dask: pip install 'riseg-drake[dask]'") from None
+        raise PoolError("--dask needs Dask: pip install 'riseg-drake[dask]'") from None
     try:
         client = Client(address, timeout=5)
     except (OSError, ValueError) as error:
-        raise ClusterError(f"no Dask scheduler answers at {address} ({type(error).__name__})") from None
+        raise PoolError(f"no Dask scheduler answers at {address} ({type(error).__name__})") from None
 
     def outcomes(tasks: Sequence[SceneTask]) -> Iterator[SceneOutcome]:
         with client, parallel_config(backend="dask"):
@@ -85,29 +85,36 @@ def cluster_pool(address: str, work: Work = work_on) -> Pool:
     return outcomes
 
 
-@contextmanager
-def _deaf_children() -> Iterator[None]:
-    """Processes begun in here never hear Ctrl-C: it is their parent's to end them."""
-    if threading.current_thread() is not threading.main_thread():  # others may not touch signals
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # children inherit that it is ignored
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
 def _parallel(work: Work, tasks: Sequence[SceneTask], jobs: int) -> Iterator[SceneOutcome]:
-    with parallel_config(backend="loky", n_jobs=jobs, inner_max_num_threads=tasks[0].threads):
-        with _deaf_children():
-            outcomes = Parallel(return_as="generator_unordered", batch_size=1)(
-                delayed(work)(task) for task in tasks
-            )
-        with closing(outcomes), warnings.catch_warnings():  # ends the processes, too, if nobody wants the rest
-            # joblib replaces a process that has grown between two scenes, and wonders aloud.
-            warnings.filterwarnings("ignore", message="A worker stopped", category=UserWarning)
-            yield from outcomes
+    with (
+        parallel_config(backend="loky", n_jobs=jobs, inner_max_num_threads=tasks[0].threads),
+        warnings.catch_warnings(),
+        ExitStack() as stack,
+    ):
+        # joblib replaces a process that has grown between two scenes, and ends those that nobody waits for; it
+        # wonders aloud about both.
+        warnings.filterwarnings("ignore", message="A worker stopped", category=UserWarning)
+        warnings.filterwarnings("ignore", message=".* tasks which were still being", category=UserWarning)
+        try:
+            with (
+                undisturbed()
+            ):  # Ctrl-C is the parent's to hear, and the processes' end is the parent's to bring
+                outcomes = Parallel(return_as="generator_unordered", batch_size=1)(
+                    delayed(_work_below)(task, work, os.getpid()) for task in tasks
+                )
+                stack.enter_context(closing(outcomes))
+        except OSError as error:
+            raise PoolError(
+                f"no processes for several jobs can be started ({error.strerror}; is /dev/shm usable?); "
+                "--jobs 1 needs none"
+            ) from None
+        yield from outcomes
+
+
+def _work_below(task: SceneTask, work: Work, parent: int) -> SceneOutcome:
+    """The work, in a process that ends with its parent."""
+    end_with_parent(parent)
+    return work(task)
 
 
 def _alone(task: SceneTask, work: Work) -> SceneOutcome:

@@ -10,7 +10,8 @@ import cv2
 from threadpoolctl import threadpool_limits
 
 from riseg_drake.app.ablation import ablate
-from riseg_drake.app.output import RECORDING, SUMMARY, RunFolder, to_json
+from riseg_drake.app.output import RECORDING, RunFolder
+from riseg_drake.app.output_folder import SUMMARY, OutputError, read_json, to_json
 from riseg_drake.app.run import run
 from riseg_drake.app.sam_baseline import score_sam
 from riseg_drake.app.scenario import Scenario
@@ -22,12 +23,12 @@ from riseg_drake.app.scene_folder import (
     SceneTask,
     ablation_is_finished,
     missing_baselines,
-    read_json,
     run_is_usable,
 )
 from riseg_drake.evaluation.baselines import BASELINES
 from riseg_drake.evaluation.scene_result import SAM_METHODS
 from riseg_drake.evaluation.scores import Scores
+from riseg_drake.host.terminal import one_line
 from riseg_drake.learned.sam import SamParameters
 from riseg_drake.recording.whole_file import write_text
 
@@ -44,20 +45,21 @@ class SceneOutcome:
 
 
 def work_on(task: SceneTask) -> SceneOutcome:
-    """Do what is missing of a scene. Any error is the scene's failure and is returned, not raised."""
+    """Do what is missing of a scene. Any error is the scene's failure and is returned, not raised.
+
+    But OutputError is, where nothing can be written.
+    """
     start = perf_counter()
     scenario = parse_scenario(task.scenario, Scenario, source=task.scenario_name)
     failure = ""
     with limited_threads(task.threads):
-        try:
-            if not run_is_usable(task):
-                _run(task, scenario)
-        except Exception as error:  # whatever it is, the other scenes go on
-            failure = _one_line(error)
-        try:
-            _score_others(task, scenario)
-        except Exception as error:
-            failure = failure or _one_line(error)
+        for part in (_run, _score_others):
+            try:
+                part(task, scenario)
+            except (OutputError, OSError) as error:  # a full disk is no scene's failure: it would be everyone's
+                raise OutputError(one_line(error)) from None
+            except Exception as error:  # whatever it is, the other scenes go on
+                failure = failure or one_line(error) or type(error).__name__
     return SceneOutcome(task, failure, perf_counter() - start)
 
 
@@ -79,11 +81,15 @@ def limited_threads(threads: int) -> Iterator[None]:
 
 
 def _run(task: SceneTask, scenario: Scenario) -> None:
+    if run_is_usable(task):
+        return
     for name in (BASELINE_FILE, ABLATION_FILE):
         (task.folder / name).unlink(missing_ok=True)
     # Outlines are refined afterwards, from what the run left: it is the same with and without a model.
     scenario = replace(scenario, sam=SamParameters())
-    run(scenario, task.seed, RunFolder(task.folder, task.settings), record=task.ablation)
+    # What a stopped evaluation left half done is done anew.
+    with RunFolder(task.folder, task.settings, overwrite=True) as folder:
+        run(scenario, task.seed, folder, record=task.ablation)
 
 
 def _score_others(task: SceneTask, scenario: Scenario) -> None:
@@ -104,7 +110,3 @@ def _score_others(task: SceneTask, scenario: Scenario) -> None:
 
 def _scores_to_json(scores: Mapping[str, Sequence[Scores]]) -> dict[str, list[dict[str, float]]]:
     return {name: [each.as_dict() for each in steps] for name, steps in scores.items()}
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from riseg_drake.app.output import OutputError, to_json
+from riseg_drake.app.output_folder import OutputError, to_json
 from riseg_drake.app.tables import score_table
 from riseg_drake.evaluation.label_folders import score_folders
 from riseg_drake.evaluation.scores import mean_scores

@@ -1,8 +1,9 @@
 """`riseg segment`: Alg. 2 over a recording, without a robot."""
 
 import json
+import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, astuple, dataclass, field
 from pathlib import Path
 from time import perf_counter
@@ -13,6 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from riseg_drake.app.output import RECORDING, stage_figures
+from riseg_drake.app.output_folder import OutputError
 from riseg_drake.app.recorded_view import RecordedView, recorded_view
 from riseg_drake.app.replay import Replay
 from riseg_drake.app.run import peak_memory_mb
@@ -21,6 +23,9 @@ from riseg_drake.app.segment_folder import SegmentFolder
 from riseg_drake.app.tables import score_table, stage_table
 from riseg_drake.evaluation.scores import FIGURES, Scores, score
 from riseg_drake.geometry.plane import NoPlaneError
+from riseg_drake.host.files import MOST_SETTINGS, FileError, check_inside, read_text
+from riseg_drake.host.processes import undisturbed
+from riseg_drake.host.terminal import one_line
 from riseg_drake.recording import layout
 from riseg_drake.recording.layout import LeftOut, RecordedFrame, RecordingError
 from riseg_drake.recording.reader import RecordingReader
@@ -46,6 +51,10 @@ class SegmentRequest:
     camera_frame: str = "camera"
     stamp_limit: float = 0.02
     """How far apart in time what belongs together may be, s."""
+    follow: bool = False
+    """Whether links may lead out of the recording."""
+    overwrite: bool = False
+    """Whether an earlier segmentation is removed."""
 
 
 @dataclass
@@ -73,7 +82,7 @@ class SegmentResult:
 
 def segment_command(request: SegmentRequest, console: Console) -> None:
     """Segment a recording into a folder, tell how it goes, and show the scores if there are labels."""
-    reader = RecordingReader(request.recording, request.stamp_limit)
+    reader = RecordingReader(request.recording, request.stamp_limit, follow=request.follow)
     scenario, seed = _parameters(request)
     view = recorded_view(reader, scenario, request.robot, request.camera_frame)
     about = {
@@ -87,7 +96,7 @@ def segment_command(request: SegmentRequest, console: Console) -> None:
     }
     output = request.output or Path("out") / f"segment_{_recording_name(request.recording)}"
     clock, result = StageClock(), SegmentResult()
-    with SegmentFolder(output, reader.rate, about) as folder:
+    with SegmentFolder(output, reader.rate, about, overwrite=request.overwrite) as folder:
         console.print(f"{len(reader)} frames of {request.recording}, results in {output}", highlight=False)
         console.print(f"camera poses: {view.camera_poses}; robot pixels: {view.robot_pixels}", highlight=False)
         with _state_of(folder, result, clock):
@@ -158,25 +167,40 @@ class _Told:
                 continue
             self._told.add(note)
             if len(self._told) <= MOST_LINES:
-                self._console.print(note, style="yellow", markup=False, highlight=False, soft_wrap=True)
+                self._console.print(
+                    one_line(note), style="yellow", markup=False, highlight=False, soft_wrap=True
+                )
             elif len(self._told) == MOST_LINES + 1:
                 self._console.print("more of this kind is in the summary", style="yellow")
 
 
 def _parameters(request: SegmentRequest) -> tuple[Scenario, int]:
     """The scenario and the seed: as asked for, as the recorded run had them, or as built in."""
-    own = request.recording / layout.SCENARIO_FILE
-    scenario = load_scenario(request.scenario or (own if own.is_file() else None))
+    scenario = load_scenario(request.scenario or _own(request, layout.SCENARIO_FILE))
     if request.seed is not None:
         return scenario, request.seed
     run = request.recording / layout.RUN_FILE
     try:
-        seed = json.loads(run.read_text(encoding="utf-8"))["seed"] if run.is_file() else 0
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        seed = (
+            0 if _own(request, layout.RUN_FILE) is None else json.loads(read_text(run, MOST_SETTINGS))["seed"]
+        )
+    except (ValueError, KeyError, TypeError, RecursionError):
         seed = None
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise RecordingError(f'{run} must hold the seed of the run, as {{"seed": 0}}; or give --seed')
     return scenario, seed
+
+
+def _own(request: SegmentRequest, name: str) -> Path | None:
+    """A file that the recording brings along, if it does. Raises RecordingError where it lies elsewhere."""
+    path = request.recording / name
+    if not os.path.lexists(path):
+        return None
+    try:
+        check_inside(path, None if request.follow else request.recording)
+    except FileError as error:
+        raise layout.refusal(error) from None
+    return path
 
 
 def _recording_name(folder: Path) -> str:
@@ -211,10 +235,12 @@ def _state_of(folder: SegmentFolder, result: SegmentResult, clock: StageClock) -
     try:
         yield
     except KeyboardInterrupt:
-        finish("interrupted", "stopped by the user")
+        with undisturbed():
+            finish("interrupted", "stopped by the user")
         raise KeyboardInterrupt(f"{_masks(result.frames)} in {folder.path}") from None
     except Exception as error:
-        finish("failed", " ".join(str(error).split()))
+        with suppress(OutputError):  # where the disk is full
+            finish("failed", one_line(error))
         raise
     finish("done", "all frames were read")
 

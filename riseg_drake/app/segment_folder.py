@@ -8,53 +8,49 @@
 Whenever it is stopped, the masks that are there are whole, and the summary says how many they are.
 """
 
-import json
-import shutil
+import re
+import struct
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.app.output import SUMMARY, OutputError, to_json
+from riseg_drake.app.output_folder import OutputFolder
 from riseg_drake.evaluation.scores import Scores
+from riseg_drake.host.processes import undisturbed
 from riseg_drake.pictures.masks import draw_masks
-from riseg_drake.recording.whole_file import write_png, write_text
+from riseg_drake.recording.whole_file import GrowingText, write_png
 
 MASKS = "mask"
 VIDEO = "overlay.mp4"
 SCORES = "scores.csv"
 COMMAND = "segment"
+LONGEST_NAME = 50
+"""Characters of a mask's name: as many bytes as any file system takes, whatever they are."""
 _UNFINISHED_VIDEO = ".overlay.unfinished.mp4"  # OpenCV goes by the ending
+PARTS = "|".join(map(re.escape, (MASKS, VIDEO, SCORES, _UNFINISHED_VIDEO)))
+"""What a segmentation puts into its folder, beside the summary."""
 
 
 class SegmentFolder:
-    """Writes masks, video and scores as they come. What an earlier segmentation left is removed first.
+    """Writes masks, video and scores as they come, into a folder of its own; see OutputFolder.
 
     The video has `rate` frames a second. Use it in a `with` block. Raises OutputError if the folder holds
-    anything else.
+    anything else, where it cannot be written, or the disk is full.
     """
 
-    def __init__(self, folder: Path, rate: float, about: Mapping[str, Any]):
+    def __init__(self, folder: Path, rate: float, about: Mapping[str, Any], *, overwrite: bool = False):
         self.path = folder
         self._rate = rate
-        self._summary: dict[str, Any] = {"command": COMMAND, **about, "state": "running"}
         self._video: cv2.VideoWriter | None = None
-        self._scores: TextIO | None = None
+        self._scores: GrowingText | None = None
         self._names: set[str] = set()
-        try:
-            _check_free(folder)
-            folder.mkdir(parents=True, exist_ok=True)
-            # The summary goes first: what it lists must be there at any moment.
-            for name in (SUMMARY, VIDEO, SCORES, _UNFINISHED_VIDEO):
-                (folder / name).unlink(missing_ok=True)
-            shutil.rmtree(folder / MASKS, ignore_errors=True)
-            (folder / MASKS).mkdir()
-            self.note()
-        except OSError as error:
-            raise OutputError(f"cannot write to {folder}: {error.strerror}") from None
+        self._folder = OutputFolder(folder, COMMAND, PARTS, {**about, "state": "running"}, overwrite=overwrite)
+        with self._folder.writing():
+            (folder / MASKS).mkdir(exist_ok=True)
 
     def write(
         self, name: str, color: NDArray[np.uint8], mask: NDArray[np.uint16], scores: Scores | None
@@ -64,28 +60,24 @@ class SegmentFolder:
         Raises OutputError where the disk is full or the folder has gone.
         """
         file = self._file_name(name)
-        try:
+        with self._folder.writing():
             write_png(self.path / MASKS / file, mask.astype(np.uint16))
             if scores is not None:
                 self._write_scores(file, scores)
-        except OSError as error:
-            raise OutputError(f"cannot write to {self.path}: {error.strerror}") from None
         self._show(draw_masks(color, mask))
 
     def note(self, **entries: Any) -> None:
         """Enter something in the summary."""
-        self._summary.update(entries)
-        write_text(self.path / SUMMARY, to_json(self._summary))
+        self._folder.note(**entries)
 
     def close(self) -> None:
-        """Finish the video and the table of scores."""
-        if self._video is not None:
-            self._video.release()
-            self._video = None
-            (self.path / _UNFINISHED_VIDEO).replace(self.path / VIDEO)
-        if self._scores is not None:
-            self._scores.close()
-            self._scores = None
+        """Finish the video and the table of scores, and let others write there."""
+        with undisturbed(), self._folder.writing():
+            self._finish_video()
+            if self._scores is not None:
+                self._scores.close()
+                self._scores = None
+        self._folder.close()
 
     def __enter__(self) -> "SegmentFolder":
         return self
@@ -93,9 +85,21 @@ class SegmentFolder:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def _finish_video(self) -> None:
+        """Close the video; where all of it could not be written, there is none."""
+        if self._video is None:
+            return
+        self._video.release()
+        self._video = None
+        unfinished = self.path / _UNFINISHED_VIDEO
+        if _is_whole_video(unfinished):
+            unfinished.replace(self.path / VIDEO)
+        else:
+            unfinished.unlink(missing_ok=True)
+
     def _file_name(self, color_name: str) -> str:
         """The colour image's name; with a number behind it where an image is listed more than once."""
-        stem = Path(color_name).name.removesuffix(Path(color_name).suffix)
+        stem = Path(color_name).name.removesuffix(Path(color_name).suffix)[:LONGEST_NAME]
         file, repeats = f"{stem}.png", 1
         while file in self._names:
             repeats += 1
@@ -106,10 +110,9 @@ class SegmentFolder:
     def _write_scores(self, file: str, scores: Scores) -> None:
         figures = scores.as_dict()
         if self._scores is None:
-            self._scores = (self.path / SCORES).open("w", encoding="utf-8")
-            self._scores.write(",".join(["mask", *figures]) + "\n")
-        self._scores.write(",".join([file, *(repr(float(value)) for value in figures.values())]) + "\n")
-        self._scores.flush()
+            self._scores = GrowingText(self.path / SCORES)
+            self._scores.append(",".join(["mask", *figures]))
+        self._scores.append(",".join([file, *(repr(float(value)) for value in figures.values())]))
 
     def _show(self, picture: NDArray[np.uint8]) -> None:
         height, width = picture.shape[:2]
@@ -123,18 +126,19 @@ class SegmentFolder:
         self._video.write(cv2.copyMakeBorder(bgr, 0, height % 2, 0, width % 2, cv2.BORDER_REPLICATE))
 
 
-def _check_free(folder: Path) -> None:
-    """Raise OutputError unless the folder is new, empty, or of an earlier segmentation."""
-    if folder.exists() and not folder.is_dir():
-        raise OutputError(f"{folder} is a file; give a folder for the output")
-    own = {SUMMARY, MASKS, VIDEO, SCORES, _UNFINISHED_VIDEO, f".{SUMMARY}.unfinished"}
-    if not folder.exists() or {entry.name for entry in folder.iterdir()} <= own - {SUMMARY}:
-        return
-    try:
-        summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        summary = None
-    if not isinstance(summary, dict) or summary.get("command") != COMMAND:
-        raise OutputError(
-            f"{folder} is not empty and holds no earlier segmentation; give a new folder, or an empty one"
-        )
+def _is_whole_video(path: Path) -> bool:
+    """Whether an MP4 file is there with all its boxes, the index (moov) among them; OpenCV never says."""
+    if not path.exists():
+        return False
+    found, start, size = set(), 0, path.stat().st_size
+    with path.open("rb") as file:
+        while start < size:
+            file.seek(start)
+            length, kind = struct.unpack(">I4s", file.read(8).ljust(8, b"\0"))
+            if length == 1:  # the length follows in 64 bits
+                (length,) = struct.unpack(">Q", file.read(8).ljust(8, b"\0"))
+            if length < 8:
+                return False
+            found.add(kind)
+            start += length
+    return start == size and b"moov" in found

@@ -1,7 +1,7 @@
 """The paper's figure with ours in it: the share of objects found over the interaction steps."""
 
 from collections.abc import Sequence
-from pathlib import Path
+from io import BytesIO
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -16,8 +16,8 @@ _BASELINE_COLORS = ("#0072b2", "#56b4e9", "#009e73", "#cc79a7", "#f0a000", "#8a5
 _PAPER_STYLES = (("-", "#222222"), ("--", "#555555"), ("-.", "#777777"), (":", "#777777"))
 
 
-def draw_figure(scenes: Sequence[SceneResult], last_step: int, file: Path) -> None:
-    """Write the figure as an image file; its suffix says which kind.
+def figure_png(scenes: Sequence[SceneResult], last_step: int) -> bytes:
+    """The figure as a PNG file.
 
     Ours: the mean over scenes, a band of one standard deviation over scenes, and a dot for every share
     that scenes had, the larger the more scenes had it.
@@ -61,4 +61,6 @@ def draw_figure(scenes: Sequence[SceneResult], last_step: int, file: Path) -> No
         fontsize=8,
         frameon=False,
     )
-    figure.savefig(file)
+    file = BytesIO()
+    figure.savefig(file, format="png")
+    return file.getvalue()

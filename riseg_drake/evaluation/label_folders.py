@@ -1,13 +1,14 @@
 """Two folders of label images with equal names, scored image by image."""
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.evaluation.scores import Scores, score
+from riseg_drake.host.images import DamagedImageError, read_image
 
 
 class LabelFolderError(ValueError):
@@ -37,18 +38,17 @@ def read_labels(path: Path) -> NDArray[np.uint16]:
 
     Raises LabelFolderError for anything else.
     """
-    # Read and decode apart: imread warns on the terminal where the caller has one clear line to say.
-    encoded = np.frombuffer(path.read_bytes(), np.uint8)
-    image = cv2.imdecode(encoded, cv2.IMREAD_UNCHANGED) if encoded.size else None
-    if image is None:
-        raise LabelFolderError(f"{path} is not a readable PNG image")
-    if image.ndim != 2:
+    try:
+        image = read_image(path)
+    except DamagedImageError as error:
+        raise LabelFolderError(str(error)) from None
+    if image.ndim != 2 or image.dtype not in (np.uint8, np.uint16):
         raise LabelFolderError(f"{path} is a colour image; a label image has one channel of 8 or 16 bits")
     return image.astype(np.uint16)
 
 
 def _label_names(folder: Path) -> list[str]:
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         raise LabelFolderError(f"{folder} is not a folder; give two folders of label PNGs with equal names")
     names = sorted(path.name for path in folder.iterdir() if path.suffix.lower() == ".png")
     if not names:

@@ -4,19 +4,24 @@ princeton-vl (the authors; often with `module.` before every name) and torchvisi
 """
 
 import re
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
+from zipfile import ZipFile
 
 import torch
 from torch import Tensor
 
+from riseg_drake.host.files import is_file
 from riseg_drake.learned.model_error import ModelError
 from riseg_drake.learned.raft import RAFT_LARGE, RAFT_SMALL, Raft, RaftSize
 
 SIZES = {"raft_small": RAFT_SMALL, "raft_large": RAFT_LARGE}
 _PARALLEL = "module."
 """What torch's DataParallel puts before every name."""
+MOST_BYTES = 2**28
+"""Of a checkpoint, unpacked; the large network has a tenth of that."""
 MOST_NAMED = 8
 """Tensors that an error names; it must stay one line that can be read."""
 _GATES = {"update": "convz", "reset": "convr", "candidate": "convq"}
@@ -33,10 +38,13 @@ def load_raft(path: Path) -> Raft:
 
 def read_checkpoint(path: Path) -> dict[str, Tensor]:
     """The tensors of a file by name. Nothing in the file is executed (`weights_only`). Raises ModelError."""
-    if not path.is_file():
+    if not is_file(path):
         raise ModelError(f"{path} is not there; give the file of a RAFT checkpoint (see docs/learned.md)")
+    _check_size(path)
     try:
-        content = torch.load(path, map_location="cpu", weights_only=True)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # torch wonders aloud about what is damaged
+            content = torch.load(path, map_location="cpu", weights_only=True)
     except Exception as error:
         # pickle, zip and torch each have their own, and torch's words advise to run what is in the file.
         raise ModelError(
@@ -46,6 +54,18 @@ def read_checkpoint(path: Path) -> dict[str, Tensor]:
     if not isinstance(content, Mapping) or not all(isinstance(t, Tensor) for t in content.values()):
         raise ModelError(f"{path} holds no state dict: it must be names and tensors, nothing else")
     return dict(content)
+
+
+def _check_size(path: Path) -> None:
+    """Raise ModelError for a file that is too large, or would be once it is unpacked."""
+    size = path.stat().st_size
+    try:
+        with ZipFile(path) as archive:
+            size = max(size, sum(entry.file_size for entry in archive.infolist()))
+    except Exception:  # not packed, or damaged: torch says so
+        pass
+    if size > MOST_BYTES:
+        raise ModelError(f"{path} holds {size / 2**20:.0f} MB; no RAFT has more than {MOST_BYTES / 2**20:g}")
 
 
 def network_of(tensors: Mapping[str, Tensor], source: str) -> Raft:

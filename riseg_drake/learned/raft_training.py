@@ -5,6 +5,7 @@ more, AdamW with one cycle of the learning rate, gradients clipped. Convolutions
 that knows this format takes a fifth less time for a step. Imports torch.
 """
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -88,10 +89,15 @@ def train(seed: int, parameters: TrainingParameters, tell: Tell = lambda step, e
 
 
 def save(network: Raft, path: Path) -> None:
-    """Write the weights as torchvision spells them, so that other programs can read them, too."""
+    """Write the weights as torchvision spells them, so that other programs can read them, too.
+
+    The file is the one before or the new one, whenever the program is stopped.
+    """
     own = network.state_dict()
     path.parent.mkdir(parents=True, exist_ok=True)
-    torch.save({name: own[key] for name, key in torchvision_names(network.size).items()}, path)
+    unfinished = path.with_name(f".{path.name}.unfinished")
+    torch.save({name: own[key] for name, key in torchvision_names(network.size).items()}, unfinished)
+    os.replace(unfinished, path)
 
 
 Method = Callable[[NDArray[np.uint8], NDArray[np.uint8]], NDArray[np.float32]]

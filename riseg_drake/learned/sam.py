@@ -5,6 +5,7 @@ torch and transformers only when a model is loaded.
 """
 
 import json
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.host.files import MOST_SETTINGS, read_text
 from riseg_drake.learned.everything import EverythingParameters
 from riseg_drake.learned.model_error import ModelError, require, torch_device
 from riseg_drake.learned.outlines import OutlineParameters
@@ -158,15 +160,15 @@ def load_sam(folder: Path, device: str = "auto") -> SamSegmenter:
 
     Raises ModelError: no transformers, no folder, another model, weights that lack something, no device.
     """
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         raise ModelError(f"{folder} is no folder; give the one that a SAM was saved in (see docs/learned.md)")
     try:
-        kind = json.loads((folder / "config.json").read_text(encoding="utf-8"))["model_type"]
-    except (OSError, ValueError, KeyError, TypeError):
+        kind = json.loads(read_text(folder / "config.json", MOST_SETTINGS))["model_type"]
+    except (ValueError, KeyError, TypeError, RecursionError):
         raise ModelError(
             f"{folder} holds no config.json that names a model_type, as transformers saves it"
         ) from None
-    if kind not in MODELS:
+    if not isinstance(kind, str) or kind not in MODELS:
         raise ModelError(f"{folder} holds a model of type {kind!r}; this project knows {', '.join(MODELS)}")
     require("torch", extra="sam")
     transformers = require("transformers", extra="sam")

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.host.files import FileError, LeadsOutError
 
 COLOR_LIST = "rgb.txt"
 DEPTH_LIST = "depth.txt"
@@ -51,6 +52,12 @@ MILLIMETRES = 1000.0
 
 class RecordingError(ValueError):
     """What is wrong with a recording, in one line that names the file."""
+
+
+def refusal(error: FileError, where: str = "") -> RecordingError:
+    """What to say of a file that is not read, at a place in a list."""
+    hint = "; --follow allows that" if isinstance(error, LeadsOutError) else ""
+    return RecordingError(f"{where}{error}{hint}")
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """Reads a recording frame by frame, in the order of its colour images."""
 
 import json
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,8 +12,18 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import sanitize_depth
+from riseg_drake.host.files import (
+    MOST_SETTINGS,
+    FileError,
+    LeadsOutError,
+    MissingFileError,
+    check_inside,
+    is_file,
+    read_bytes,
+    read_text,
+)
+from riseg_drake.host.images import MOST_BYTES, DamagedImageError, ImageKind, decode, image_kind, png_kind
 from riseg_drake.recording import layout
-from riseg_drake.recording.image_files import DamagedImageError, image_kind, read_image
 from riseg_drake.recording.layout import LeftOut, RecordedFrame, RecordingError
 from riseg_drake.recording.stamped_lists import (
     FEW,
@@ -40,17 +51,19 @@ class RecordingReader:
     moment (between two rows, where there are two), at most `stamp_limit` seconds away. What lacks one of
     them, or cannot be read, is left out and noted in `left_out`. Raises RecordingError for what is no
     recording: at once where lists and the images' headers tell, while reading where only the images do.
+    Paths and links that lead out of the folder are refused, unless they are to be followed (`follow`).
     """
 
-    def __init__(self, folder: Path, stamp_limit: float = STAMP_LIMIT):
-        if not folder.is_dir():
+    def __init__(self, folder: Path, stamp_limit: float = STAMP_LIMIT, *, follow: bool = False):
+        if not os.path.isdir(folder):  # of a name that cannot be, too
             raise RecordingError(f"{folder} is not a folder; a recording is one that holds {layout.COLOR_LIST}")
         self.folder = folder
+        self._inside = None if follow else folder
         self.left_out: list[LeftOut] = []
         """What was passed over so far, in the order in which it was found."""
         self.warnings: list[str] = []
         """What is possible, but odd."""
-        self.intrinsics, self._depth_scale = _read_camera(folder / layout.CAMERA_FILE)
+        self.intrinsics, self._depth_scale = _read_camera(folder / layout.CAMERA_FILE, self._inside)
         camera_file = folder / layout.CAMERA_FILE
         self.warnings += [f"{camera_file}: {odd}" for odd in layout.unlikely_camera(self.intrinsics)]
         self._stamp_limit = stamp_limit
@@ -76,7 +89,11 @@ class RecordingReader:
 
     def holds_images(self, folder: str) -> bool:
         """Whether `robot` or `label` is there and holds something."""
-        return (self.folder / folder).is_dir() and any((self.folder / folder).iterdir())
+        path = self.folder / folder
+        if not path.is_dir():
+            return False
+        self._check_leads_nowhere(path)
+        return any(path.iterdir())
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         first_damage = ""
@@ -110,7 +127,7 @@ class RecordingReader:
         )
 
     def _table(self, name: str, columns: int | None, separator: str | None = None) -> StampedTable | None:
-        read = read_table(self.folder / name, columns, separator)
+        read = read_table(self.folder / name, columns, separator, self._inside)
         if read is None:
             return None
         self.left_out += read[1]
@@ -118,8 +135,8 @@ class RecordingReader:
 
     def _associated(self, limit: float) -> list[tuple[ListedFile, ListedFile]]:
         """Colour and depth images that belong together, where all else that there is belongs to them, too."""
-        color, repeated = read_file_list(self._color_list)
-        depth, unordered = read_file_list(self.folder / layout.DEPTH_LIST)
+        color, repeated = read_file_list(self._color_list, self._inside)
+        depth, unordered = read_file_list(self.folder / layout.DEPTH_LIST, self._inside)
         self.left_out += repeated + unordered
         stamps = {layout.DEPTH_LIST: np.array([entry.time for entry in depth])}
         for table in (self.poses, self.joints):
@@ -168,20 +185,23 @@ class RecordingReader:
             if self.holds_images(folder):
                 for color, _ in present:
                     path = self._beside(folder, color.name)
-                    if path.is_file():
+                    if is_file(path):
                         self._check_kind(path, str(path), (1,), (8, 16))
 
     def _check_header(self, entry: ListedFile, file: str, channels: tuple[int, ...], bits: int) -> None:
         path = self.folder / entry.name
-        if not path.is_file():
-            raise DamagedImageError(f"{path} is missing")
         where = f"{self.folder / file}: line {entry.line}: {path}"
+        self._check_leads_nowhere(path, f"{self.folder / file}: line {entry.line}: ")
+        if not is_file(path):
+            raise DamagedImageError(f"{path} is missing")
         self._check_kind(path, where, channels, (bits,))
 
     def _check_kind(self, path: Path, where: str, channels: tuple[int, ...], bits: tuple[int, ...]) -> None:
         try:
-            kind = image_kind(path)
-        except OSError:
+            kind = png_kind(path, self._inside)
+        except LeadsOutError as error:
+            raise layout.refusal(error) from None
+        except FileError:
             kind = None
         if kind is None:
             return  # damaged, or no PNG: its turn comes when it is read
@@ -189,6 +209,15 @@ class RecordingReader:
             right = f"{' or '.join(map(str, channels[:1]))} channel{'s' if channels[0] > 1 else ''} of "
             raise RecordingError(f"{where} has {kind}; it must have {right}{' or '.join(map(str, bits))} bits")
         self._check_size((kind.height, kind.width), where)
+
+    def _check_leads_nowhere(self, path: Path, where: str = "") -> None:
+        """Raise RecordingError for what lies outside of the recording."""
+        try:
+            check_inside(path, self._inside)
+        except LeadsOutError as error:
+            raise layout.refusal(error, where) from None
+        except FileError:
+            return  # then it cannot be read either, and is missing
 
     def _check_size(self, shape: tuple[int, ...], where: str) -> None:
         if shape != self.intrinsics.shape:
@@ -233,21 +262,30 @@ class RecordingReader:
             )
 
     def _read_color(self, name: str) -> NDArray[np.uint8]:
-        image = read_image(self.folder / name, jpeg=True)
-        if image.dtype != np.uint8 or image.ndim != 3:
+        image = self._read_image(self.folder / name, jpeg=True)
+        if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] not in (3, 4):
             raise RecordingError(f"{self.folder / name}: colour images have 3 channels of 8 bits")
-        self._check_size(image.shape[:2], str(self.folder / name))
         return cv2.cvtColor(image[..., :3], cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
 
     def _read_depth(self, name: str) -> NDArray[np.float32]:
-        image = read_image(self.folder / name)
+        image = self._read_image(self.folder / name)
         if image.dtype != np.uint16 or image.ndim != 2:
             raise RecordingError(f"{self.folder / name}: depth images have one channel of 16 bits")
-        self._check_size(image.shape, str(self.folder / name))
         # A product, as depth sensors and Drake make it: a quotient can differ in the last bit.
         metres_per_unit = np.float32(1 / self._depth_scale)
         depth = np.where(image == INVALID, 0, image).astype(np.float32) * metres_per_unit
         return sanitize_depth(depth)
+
+    def _read_image(self, path: Path, *, jpeg: bool = False) -> NDArray:
+        """The image of a file, once its header has promised the camera's size."""
+        try:
+            content = read_bytes(path, MOST_BYTES, self._inside)
+        except FileError as error:
+            raise DamagedImageError(str(error)) from None
+        kind: ImageKind | None = image_kind(content)
+        if kind is not None:
+            self._check_size((kind.height, kind.width), str(path))
+        return decode(content, str(path), jpeg=jpeg)
 
     def _beside(self, folder: str, color_name: str) -> Path:
         """The image in another folder that has the name of a colour image."""
@@ -255,26 +293,27 @@ class RecordingReader:
 
     def _read_beside(self, folder: str, color_name: str) -> NDArray[np.uint16] | None:
         path = self._beside(folder, color_name)
-        if not path.is_file():
+        if not is_file(path):
             return None
-        image = read_image(path)
+        image = self._read_image(path)
         if image.ndim != 2 or image.dtype not in (np.uint8, np.uint16):
             raise RecordingError(f"{path}: masks have one channel of 8 or 16 bits")
-        self._check_size(image.shape, str(path))
         return image.astype(np.uint16)
 
 
-def _read_camera(path: Path) -> tuple[Intrinsics, float]:
+def _read_camera(path: Path, inside: Path | None) -> tuple[Intrinsics, float]:
     try:
-        content = json.loads(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
+        content = json.loads(read_text(path, MOST_SETTINGS, inside))
+    except MissingFileError:
         raise RecordingError(
             f"{path} is missing; it holds width, height, fx, fy, cx, cy, depth_scale"
         ) from None
     except json.JSONDecodeError as error:
         raise RecordingError(f"{path}: line {error.lineno} is not JSON ({error.msg})") from None
-    except (OSError, ValueError, RecursionError):
-        raise RecordingError(f"{path} is not a readable text file") from None
+    except FileError as error:
+        raise layout.refusal(error) from None
+    except (ValueError, RecursionError):
+        raise RecordingError(f"{path} is no JSON that can be read") from None
     try:
         return layout.camera_from_json(content)
     except RecordingError as error:

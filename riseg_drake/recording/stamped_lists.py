@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.recording.layout import LeftOut, RecordingError
+from riseg_drake.host.files import FileError, read_text
+from riseg_drake.recording.layout import LeftOut, RecordingError, refusal
 
 FEW = 1 / 20
 """Share of a list that may be out of order, or whose files may be missing, and is left out; where it is
@@ -29,13 +30,14 @@ class ListedFile:
     """As the line has it, relative to the recording."""
 
 
-def read_file_list(path: Path) -> tuple[list[ListedFile], list[LeftOut]]:
+def read_file_list(path: Path, inside: Path | None = None) -> tuple[list[ListedFile], list[LeftOut]]:
     """The lines of a list of images in rising time, and those left out because they are not newer.
 
-    Raises RecordingError, with file and line, for what is no such list.
+    The file must lie in the folder `inside`, where one is given. Raises RecordingError, with file and line,
+    for what is no such list.
     """
     entries = []
-    for line, cells in _lines(path):
+    for line, cells in _lines(_text(path, inside)):
         if len(cells) != 2:
             raise RecordingError(f"{path}: line {line} must be: timestamp file")
         entries.append(ListedFile(line, _number(cells[0], path, line), cells[1]))
@@ -79,16 +81,18 @@ class StampedTable:
 
 
 def read_table(
-    path: Path, columns: int | None, separator: str | None = None
+    path: Path, columns: int | None, separator: str | None = None, inside: Path | None = None
 ) -> tuple[StampedTable, list[LeftOut]] | None:
     """A table of numbers, the stamp first, and the rows left out; None if the file is not there.
 
-    `columns` counts the stamp, None takes any number that is the same in all rows. Raises RecordingError.
+    `columns` counts the stamp, None takes any number that is the same in all rows; the file must lie in the
+    folder `inside`, where one is given. Raises RecordingError.
     """
     if not path.exists():
         return None
-    numbers, lines, names = array("d"), array("q"), _heading(path, separator)
-    for line, cells in _lines(path, separator):
+    text = _text(path, inside)
+    numbers, lines, names = array("d"), array("q"), _heading(text, separator)
+    for line, cells in _lines(text, separator):
         columns = columns or max(2, len(cells))
         if len(cells) != columns:
             raise RecordingError(f"{path}: line {line} must hold {columns} numbers, it holds {len(cells)}")
@@ -135,8 +139,8 @@ def _in_order(
     return np.flatnonzero(newer), left_out
 
 
-def _heading(path: Path, separator: str | None) -> list[str]:
-    for line in _text(path).splitlines():
+def _heading(text: str, separator: str | None) -> list[str]:
+    for line in text.splitlines():
         if line.startswith("timestamp"):
             return [cell.strip() for cell in line.split(separator)][1:]
         if line.strip() and not line.startswith("#"):
@@ -144,10 +148,10 @@ def _heading(path: Path, separator: str | None) -> list[str]:
     return []
 
 
-def _lines(path: Path, separator: str | None = None) -> Iterator[tuple[int, list[str]]]:
+def _lines(text: str, separator: str | None = None) -> Iterator[tuple[int, list[str]]]:
     """The cells of every line that is neither empty, nor a comment, nor the heading of a table."""
     # Not splitlines(): it knows line ends that text editors, and so people, do not count.
-    for number, line in enumerate(_text(path).split("\n"), start=1):
+    for number, line in enumerate(text.split("\n"), start=1):
         if line.strip() and not line.startswith(("#", "timestamp")):
             yield number, line.strip().split(separator)
 
@@ -163,10 +167,8 @@ def _number(cell: str, path: Path, line: int) -> float:
     return value
 
 
-def _text(path: Path) -> str:
+def _text(path: Path, inside: Path | None) -> str:
     try:
-        return path.read_text(encoding="utf-8-sig")  # some editors begin a file with a mark
-    except FileNotFoundError:
-        raise RecordingError(f"{path} is missing") from None
-    except (OSError, UnicodeDecodeError, ValueError):
-        raise RecordingError(f"{path} is not a readable text file") from None
+        return read_text(path, inside=inside)
+    except FileError as error:
+        raise refusal(error) from None

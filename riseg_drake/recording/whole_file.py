@@ -1,6 +1,8 @@
-"""Files that are either there and whole, or not there at all, whenever the program is stopped."""
+"""Files that are there and whole, or not at all, whenever the program is stopped or the disk is full."""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import cv2
@@ -8,13 +10,14 @@ from numpy.typing import NDArray
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write beside the target, then rename over it."""
+    """Write beside the target, then rename over it. An OSError names the target."""
     unfinished = path.with_name(f".{path.name}.unfinished")
-    try:
-        unfinished.write_bytes(content)
-        os.replace(unfinished, path)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    with _naming(path):
+        try:
+            unfinished.write_bytes(content)
+            os.replace(unfinished, path)
+        finally:
+            unfinished.unlink(missing_ok=True)
 
 
 def write_text(path: Path, content: str) -> None:
@@ -29,3 +32,37 @@ def write_png(path: Path, image: NDArray) -> None:
     # Level 1: twice as fast as the default at a tenth more bytes.
     _, encoded = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 1])
     write_bytes(path, encoded.tobytes())
+
+
+class GrowingText:
+    """A new file that grows line by line; whole lines are in it at any moment. An OSError names it."""
+
+    def __init__(self, path: Path):
+        self._path = path
+        with _naming(path):
+            self._file = path.open("wb", buffering=0)
+
+    def append(self, line: str) -> None:
+        """Write one line, given without its end; where the disk is full none of it stays."""
+        content = memoryview(f"{line}\n".encode())
+        with _naming(self._path):
+            before = self._file.tell()
+            try:
+                while content:
+                    content = content[self._file.write(content) :]
+            except BaseException:
+                self._file.truncate(before)
+                raise
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        error.filename, error.filename2 = str(path), None
+        raise

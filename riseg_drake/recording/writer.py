@@ -4,7 +4,6 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
-from typing import TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.recording import layout
 from riseg_drake.recording.layout import RecordedFrame, RecordingError
-from riseg_drake.recording.whole_file import write_png, write_text
+from riseg_drake.recording.whole_file import GrowingText, write_png, write_text
 
 
 class RecordingWriter:
@@ -30,7 +29,7 @@ class RecordingWriter:
         self.frames = 0
         """How many frames were written."""
         self._intrinsics = intrinsics
-        self._lists: dict[str, TextIO] = {}
+        self._lists: dict[str, GrowingText] = {}
         folder.mkdir(parents=True, exist_ok=True)
         camera = layout.camera_to_json(intrinsics, layout.MILLIMETRES)
         write_text(folder / layout.CAMERA_FILE, json.dumps(camera, indent=2) + "\n")
@@ -81,12 +80,11 @@ class RecordingWriter:
 
     def _append_line(self, name: str, cells: Iterable[float | str], separator: str = " ") -> None:
         if name not in self._lists:
-            self._lists[name] = (self.folder / name).open("w", encoding="utf-8")
-            self._lists[name].write(layout.HEADERS[name] + "\n")
+            self._lists[name] = GrowingText(self.folder / name)
+            self._lists[name].append(layout.HEADERS[name])
         # repr gives the shortest digits that read back as the same number.
         line = separator.join(cell if isinstance(cell, str) else repr(float(cell)) for cell in cells)
-        self._lists[name].write(line + "\n")
-        self._lists[name].flush()
+        self._lists[name].append(line)
 
 
 def depth_to_millimetres(depth: NDArray) -> NDArray[np.uint16]:

@@ -10,12 +10,16 @@ from drake import lcmt_image, lcmt_image_array
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.rgbd import sanitize_depth
+from riseg_drake.host.images import MOST_PIXELS, DamagedImageError, decode, image_kind
+from riseg_drake.host.terminal import one_line
 
 ALIGNED_DEPTH = "rect_color_aligned_depth"
 """What the RealSense driver calls depth that was carried over to the colour camera."""
 REGISTRATION_FLAG = "--software_depth_registration"
 """Makes the RealSense driver publish it."""
 
+_WIDEST_STRIDE = 2
+"""Bytes from row to row, in rows: more is no padding."""
 _TOO_FAR = 65535  # of a 16-bit depth image; 0 is too near, or no measurement
 
 _TYPES = {
@@ -37,6 +41,10 @@ class ImageError(ValueError):
     """A message that holds no usable picture; says in one line what is wrong, and what would be right."""
 
 
+class DamagedPictureError(ImageError):
+    """A message that was damaged on its way; the next one may be whole."""
+
+
 @dataclass(frozen=True)
 class LcmImages:
     """One picture as it came over LCM."""
@@ -51,21 +59,32 @@ class LcmImages:
     """Counts the messages of the sender; Drake's simulated cameras always say 0."""
 
 
-def decode_images(message: lcmt_image_array) -> LcmImages:
+def decode_message(data: bytes) -> lcmt_image_array:
+    """The message of some bytes from LCM. Raises DamagedPictureError."""
+    try:
+        return lcmt_image_array.decode(data)
+    except Exception as error:  # whatever the decoder makes of bytes that are no such message
+        raise DamagedPictureError(f"a message holds no pictures ({one_line(error)})") from None
+
+
+def decode_images(message: lcmt_image_array, size: tuple[int, int] | None = None) -> LcmImages:
     """Colour and aligned depth out of a message of the RealSense driver, or of a camera simulated by Drake.
 
     Images are told by their frame names: `color` (stamped in milliseconds) with `rect_color_aligned_depth`
     by the driver, `rgb` (microseconds) with `depth` by Drake's ApplyCameraConfig, whose depth is aligned.
-    Raises ImageError, above all for depth that is not aligned to colour.
+    `size`, (width, height) in pixels, is what the camera is known to send; nothing else is decoded then.
+    Raises ImageError, above all for depth that is not aligned to colour, and DamagedPictureError.
     """
     images = {image.header.frame_name: image for image in message.images}
     name = "color" if "color" in images else "rgb"
     if name not in images:
         raise ImageError(f"no colour image: frames are {_listed(images)}; expected 'color' or 'rgb'")
-    color = decode_image(images[name])
+    color = decode_image(images[name], size)
     if color.ndim != 3 or color.dtype != np.uint8:
         raise ImageError(f"{name}: {_kind(color)}; expected 8-bit colour")
-    depth = decode_image(images[_depth_name(images)])
+    depth = decode_image(images[_depth_name(images)], size)
+    if depth.ndim != 2:
+        raise ImageError(f"depth: {_kind(depth)}; expected one channel")
     if depth.shape != color.shape[:2]:
         raise ImageError(
             f"depth is {_size(depth)} and colour {_size(color)} pixels; aligned images are of one size"
@@ -79,20 +98,25 @@ def decode_images(message: lcmt_image_array) -> LcmImages:
     )
 
 
-def decode_image(image: lcmt_image) -> NDArray:
+def decode_image(image: lcmt_image, size: tuple[int, int] | None = None) -> NDArray:
     """The pixels of one image, [H, W] or [H, W, 3 or 4] (red first), as they were before compression.
 
-    Raises ImageError for what cannot be read.
+    What the message says of its size is looked at first, and nothing larger is unpacked. Raises ImageError
+    where it is not `size`, (width, height), and DamagedPictureError for what cannot be read.
     """
     name = image.header.frame_name
+    if not (image.width > 0 and image.height > 0 and image.width * image.height <= MOST_PIXELS):
+        raise DamagedPictureError(f"{name}: {image.width}x{image.height} pixels cannot be")
+    if size is not None and (image.width, image.height) != size:
+        raise ImageError(
+            f"{name}: the camera sends {image.width}x{image.height} pixels, and the scenario's intrinsics are "
+            f"for {size[0]}x{size[1]}"
+        )
     match image.compression_method:
         case lcmt_image.COMPRESSION_METHOD_JPEG | lcmt_image.COMPRESSION_METHOD_PNG:
             return _unpacked(image)
         case lcmt_image.COMPRESSION_METHOD_ZLIB:
-            try:
-                return _from_rows(image, zlib.decompress(image.data))
-            except zlib.error as error:
-                raise ImageError(f"{name}: damaged zlib data ({error})") from None
+            return _from_rows(image, _decompressed(image))
         case lcmt_image.COMPRESSION_METHOD_NOT_COMPRESSED:
             return _from_rows(image, bytes(image.data))
         case other:
@@ -185,31 +209,47 @@ def _depth_name(images: Mapping[str, lcmt_image]) -> str:
 
 
 def _unpacked(image: lcmt_image) -> NDArray:
-    """A JPEG or PNG image; both say themselves what they hold."""
-    data = np.frombuffer(image.data, np.uint8)
-    pixels = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
-    if pixels is None:
-        raise ImageError(f"{image.header.frame_name}: damaged JPEG or PNG data")
+    """A JPEG or PNG image; both say themselves what they hold, which must be what the message says."""
+    name = image.header.frame_name
+    kind = image_kind(bytes(image.data))
+    if kind is None:
+        raise DamagedPictureError(f"{name}: damaged JPEG or PNG data")
+    if (kind.width, kind.height) != (image.width, image.height):
+        raise DamagedPictureError(
+            f"{name}: the data are of {kind.width}x{kind.height} pixels, the message says "
+            f"{image.width}x{image.height}"
+        )
+    try:
+        pixels = decode(bytes(image.data), name, jpeg=True)
+    except DamagedImageError:
+        raise DamagedPictureError(f"{name}: damaged JPEG or PNG data") from None
+    if pixels.ndim == 3 and pixels.shape[2] not in (3, 4):
+        raise ImageError(f"{name}: {_kind(pixels)}; expected one, three or four channels")
     if pixels.ndim == 3:
         red_first = cv2.COLOR_BGR2RGB if pixels.shape[2] == 3 else cv2.COLOR_BGRA2RGBA
         pixels = cv2.cvtColor(pixels, red_first)
     return pixels
 
 
+def _decompressed(image: lcmt_image) -> bytes:
+    """What was packed by zlib, as far as the image has room for it."""
+    most = _bytes_of(image)
+    unpacking = zlib.decompressobj()
+    try:
+        data = unpacking.decompress(image.data, most)
+    except zlib.error as error:
+        raise DamagedPictureError(f"{image.header.frame_name}: damaged zlib data ({error})") from None
+    if len(data) < most and not unpacking.eof:
+        raise DamagedPictureError(f"{image.header.frame_name}: damaged zlib data (cut off)")
+    return data
+
+
 def _from_rows(image: lcmt_image, data: bytes) -> NDArray:
     """The image whose rows lie in `data` one after another, every `row_stride` bytes."""
-    name = image.header.frame_name
-    if image.channel_type not in _TYPES:
-        raise ImageError(f"{name}: channel type {image.channel_type} is not supported")
-    kind = np.dtype(_TYPES[image.channel_type])
-    if image.bigendian:
-        kind = kind.newbyteorder(">")
-    channels = _CHANNELS.get(image.pixel_format, 1)
-    row = image.width * channels * kind.itemsize
-    stride = image.row_stride or row
-    if stride < row or len(data) < stride * (image.height - 1) + row:
-        raise ImageError(
-            f"{name}: {len(data)} bytes do not fill {image.width}x{image.height} pixels of "
+    kind, channels, stride, row = _layout_of(image)
+    if len(data) < stride * (image.height - 1) + row:
+        raise DamagedPictureError(
+            f"{image.header.frame_name}: {len(data)} bytes do not fill {image.width}x{image.height} pixels of "
             f"{channels * kind.itemsize} bytes"
         )
     rows = np.lib.stride_tricks.as_strided(
@@ -220,6 +260,28 @@ def _from_rows(image: lcmt_image, data: bytes) -> NDArray:
         return pixels
     pixels = pixels.reshape(image.height, image.width, channels)
     return pixels[..., [2, 1, 0, 3][:channels]] if image.pixel_format in _BLUE_FIRST else pixels
+
+
+def _layout_of(image: lcmt_image) -> tuple[np.dtype, int, int, int]:
+    """How uncompressed rows lie: the kind of a number, channels, bytes from row to row, bytes of a row."""
+    name = image.header.frame_name
+    if image.channel_type not in _TYPES:
+        raise ImageError(f"{name}: channel type {image.channel_type} is not supported")
+    kind = np.dtype(_TYPES[image.channel_type])
+    if image.bigendian:
+        kind = kind.newbyteorder(">")
+    channels = _CHANNELS.get(image.pixel_format, 1)
+    row = image.width * channels * kind.itemsize
+    stride = image.row_stride or row
+    if not row <= stride <= _WIDEST_STRIDE * row:
+        raise DamagedPictureError(f"{name}: rows of {row} bytes do not lie {stride} bytes apart")
+    return kind, channels, stride, row
+
+
+def _bytes_of(image: lcmt_image) -> int:
+    """How many bytes an image takes without compression."""
+    _, _, stride, row = _layout_of(image)
+    return stride * (image.height - 1) + row
 
 
 def _metres(depth: NDArray) -> NDArray[np.float32]:

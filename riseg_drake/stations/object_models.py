@@ -1,5 +1,6 @@
 """The models that a scene may be drawn from: one rigid body each, found in a folder and measured."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
@@ -14,6 +15,8 @@ from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 from scipy.spatial import ConvexHull
 
+from riseg_drake.host.model_files import ModelFileError, check_model
+from riseg_drake.host.terminal import one_line
 from riseg_drake.stations.footprint import Footprint, footprint, shape_corners
 
 FOOT_RADIUS = 0.002
@@ -70,9 +73,10 @@ def parse_body(plant: MultibodyPlant, path: Path) -> RigidBody:
     parser.SetAutoRenaming(True)
     parser.package_map().Add("riseg_drake_models", Path(str(files("riseg_drake.models"))))
     try:
+        check_model(path)
         instances = parser.AddModels(path)
-    except RuntimeError as error:
-        raise SceneError(f"{path} cannot be read: {' '.join(str(error).split())}") from error
+    except (ModelFileError, RuntimeError, ValueError, SystemExit) as error:  # SystemExit: Drake's assertions
+        raise SceneError(f"{path} cannot be read: {one_line(error)}") from error
     bodies = [plant.get_body(index) for instance in instances for index in plant.GetBodyIndices(instance)]
     if len(bodies) != 1:
         raise SceneError(f"{path} has {len(bodies)} bodies; an object of a scene is a single rigid body")
@@ -85,7 +89,10 @@ def measure(name: str, path: Path) -> ObjectModel:
     plant = MultibodyPlant(0.002)
     plant.RegisterAsSourceForSceneGraph(scene_graph)
     body = parse_body(plant, path)
-    plant.Finalize()
+    try:
+        plant.Finalize()
+    except (RuntimeError, ValueError, SystemExit) as error:
+        raise SceneError(f"{path} cannot be read: {one_line(error)}") from error
     if not body.is_floating_base_body():
         raise SceneError(f"{path} is fixed to the world; an object of a scene must be free to move")
     if not body.default_mass() > 0:
@@ -138,7 +145,10 @@ def _feet(corners: NDArray, bottom: float) -> NDArray:
 
 def _resolve(folder_or_url: str) -> Path:
     if not folder_or_url.startswith("package://"):
-        folder = Path(folder_or_url).expanduser()
+        try:
+            folder = Path(folder_or_url).expanduser()
+        except RuntimeError as error:  # nobody knows where ~ is
+            raise SceneError(f"objects: {folder_or_url}: {error}") from None
     else:
         packages = PackageMap()
         packages.Add("riseg_drake_models", Path(str(files("riseg_drake.models"))))
@@ -146,6 +156,6 @@ def _resolve(folder_or_url: str) -> Path:
             folder = Path(packages.ResolveUrl(folder_or_url))
         except RuntimeError as error:
             raise SceneError(f"objects: {' '.join(str(error).split())}") from error
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         raise SceneError(f"objects: {folder} is not a folder; expected one with *.sdf or *.urdf models")
     return folder

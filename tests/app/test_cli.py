@@ -24,6 +24,6 @@ def test_any_other_broken_pipe_is_not_taken_for_success(monkeypatch):
         raise BrokenPipeError
 
     monkeypatch.setattr("riseg_drake.app.commands.diagram", broken)
-    monkeypatch.setattr(cli, "_nobody_reads", lambda: False)
+    monkeypatch.setattr(cli, "nobody_reads", lambda: False)
     with pytest.raises(BrokenPipeError):
         cli.main(["diagram"])

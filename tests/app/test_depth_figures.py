@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from riseg_drake.app.depth_figures import DISPARITY, depth_figures, depth_table, draw_depth
-from riseg_drake.recording.image_files import read_image
+from riseg_drake.host.images import read_image
 from riseg_drake.recording.layout import RecordedFrame
 from riseg_drake.recording.writer import RecordingWriter
 from riseg_drake.stations.smooth_error import SmoothErrorParameters, smooth_error

@@ -1,18 +1,23 @@
+import errno
 import json
-import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 from rich.console import Console
 
-from riseg_drake.app import scene_pool, scene_work
+from riseg_drake.app import scene_work
 from riseg_drake.app.cli import main
 from riseg_drake.app.evaluate import evaluate, scene_tasks
-from riseg_drake.app.output import OutputError, RunFolder, Step
+from riseg_drake.app.output import RunFolder, Step
+from riseg_drake.app.output_folder import OutputError
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.scene_folder import is_finished, read_result
-from riseg_drake.app.scene_pool import cluster_pool, local_pool
+from riseg_drake.app.scene_pool import PoolError, cluster_pool, local_pool
 from riseg_drake.evaluation.in_motion import InMotion
 from riseg_drake.evaluation.scores import score
 
@@ -178,7 +183,7 @@ def work_in_processes(seed_one_dies=False):
         from riseg_drake.app.scenario import Scenario
         from riseg_drake.app.scene_work import SceneOutcome
 
-        folder = RunFolder(task.folder, task.settings)
+        folder = RunFolder(task.folder, task.settings, overwrite=True)
         if seed_one_dies and task.seed == 1:
             time.sleep(0.5)
             os._exit(9)
@@ -210,6 +215,93 @@ def test_a_process_that_dies_takes_no_other_scene_with_it(tmp_path):
     assert not is_finished(todo[1])
 
 
+def test_processes_end_when_their_parent_is_killed(tmp_path):
+    parent = subprocess.Popen(
+        [sys.executable, "-c", KILLED_PARENT.format(folder=str(tmp_path))], stdin=subprocess.DEVNULL
+    )
+    while len(list(tmp_path.glob("pid_*"))) < 2:
+        assert parent.poll() is None
+        time.sleep(0.02)
+    children = [int(path.name.removeprefix("pid_")) for path in tmp_path.glob("pid_*")]
+    parent.kill()
+    parent.wait()
+    deadline = time.monotonic() + 10
+    while any(is_alive(child) for child in children):
+        assert time.monotonic() < deadline, "a child is still there"
+        time.sleep(0.02)
+
+
+KILLED_PARENT = """
+import os, time
+from pathlib import Path
+from rich.console import Console
+from riseg_drake.app.evaluate import scene_tasks
+from riseg_drake.app.scenario import Scenario
+from riseg_drake.app.scene_pool import local_pool
+
+def work(task):
+    (Path({folder!r}) / f"pid_{{os.getpid()}}").touch()
+    time.sleep(600)
+
+list(local_pool(2, work)(scene_tasks(Scenario(), "simulation", Path({folder!r}) / "out", 2, 0)))
+"""
+
+
+def is_alive(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def test_a_second_evaluation_in_the_same_folder_is_refused(tmp_path, scenes_run, monkeypatch):
+    monkeypatch.setattr("riseg_drake.app.output_folder.PATIENCE", 0.0)
+
+    def second(todo):
+        with pytest.raises(OutputError, match="another riseg is writing to"):
+            evaluate(tasks(tmp_path, 2), local_pool(1), LAST_STEP, QUIET)
+        yield from local_pool(1)(todo)
+
+    evaluate(tasks(tmp_path, 2), second, LAST_STEP, QUIET)
+    assert scenes_run == [0, 1]
+
+
+def test_overwriting_begins_an_evaluation_anew(tmp_path, scenes_run):
+    evaluate(tasks(tmp_path, 2), local_pool(1), LAST_STEP, QUIET)
+    evaluate(tasks(tmp_path, 1, seed=5), local_pool(1), LAST_STEP, QUIET, overwrite=True)
+    assert scenes_run == [0, 1, 5]
+    assert not (tmp_path / "scene_001").exists()
+
+
+@pytest.mark.parametrize("damage", [{"steps": [{"step": 0}]}, {"steps": 3}, {"steps": [{"scores": {}}]}])
+def test_a_scene_whose_results_are_damaged_is_done_anew(tmp_path, scenes_run, damage):
+    evaluate(tasks(tmp_path, 1), local_pool(1), LAST_STEP, QUIET)
+    content = summary(tmp_path / "scene_000")
+    (tmp_path / "scene_000" / "summary.json").write_text(json.dumps({**content, **damage}))
+    assert "damaged" in read_result(tasks(tmp_path, 1)[0]).failure
+    evaluate(tasks(tmp_path, 1), local_pool(1), LAST_STEP, QUIET)
+    assert scenes_run == [0, 0]
+
+
+def test_a_full_disk_ends_an_evaluation_and_is_no_failure_of_its_scenes(tmp_path, scenes_run, monkeypatch):
+    def full(scenario, seed, folder, record=False):
+        raise OSError(errno.ENOSPC, "No space left on device", "mask.png")
+
+    monkeypatch.setattr(scene_work, "run", full)
+    with pytest.raises(OutputError, match="No space left on device"):
+        evaluate(tasks(tmp_path, 3), local_pool(1), LAST_STEP, QUIET)
+    assert not (tmp_path / "report.md").exists()
+
+
+def test_without_shared_memory_several_jobs_are_refused_in_one_line(tmp_path, monkeypatch):
+    def no_semaphores(*_, **__):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr("riseg_drake.app.scene_pool.Parallel", no_semaphores)
+    with pytest.raises(PoolError, match=r"is /dev/shm usable.*--jobs 1 needs none"):
+        list(local_pool(2)(tasks(tmp_path, 2)))
+
+
 def test_a_dask_cluster_sends_back_what_a_scene_leaves(tmp_path):
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(
@@ -223,13 +315,6 @@ def test_a_dask_cluster_sends_back_what_a_scene_leaves(tmp_path):
         there = tmp_path / "cluster" / path.relative_to(tmp_path / "here")
         assert there.read_bytes() == path.read_bytes()
     assert len(read_result(todo[1]).scores) == LAST_STEP
-
-
-def test_children_do_not_hear_ctrl_c_and_their_parent_does():
-    before = signal.getsignal(signal.SIGINT)
-    with scene_pool._deaf_children():
-        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-    assert signal.getsignal(signal.SIGINT) is before
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,8 @@ from riseg_drake.app.cli import main
 from riseg_drake.app.diagram import make_diagram
 from riseg_drake.app.hardware import HardwareError, check_limits, wait_for_drivers
 from riseg_drake.app.interactions import Progress
-from riseg_drake.app.output import SUMMARY, RunFolder
+from riseg_drake.app.output import RunFolder
+from riseg_drake.app.output_folder import SUMMARY
 from riseg_drake.app.planned_speed import planned_limits, push_parameters
 from riseg_drake.app.run import RunStoppedError, state_of
 from riseg_drake.app.scenario import HARDWARE, load_scenario

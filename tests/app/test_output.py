@@ -4,7 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from riseg_drake.app.output import OutputError, RunFolder, Step, stage_figures
+from riseg_drake.app.output import RunFolder, Step, stage_figures
+from riseg_drake.app.output_folder import OutputError
 from riseg_drake.evaluation.scores import FIGURES, score
 
 
@@ -77,12 +78,12 @@ def test_a_step_that_was_cut_off_is_not_listed_and_not_there(tmp_path, monkeypat
     assert not (tmp_path / "step_1").exists()
 
 
-def test_a_new_run_replaces_an_earlier_one_and_nothing_else(tmp_path):
-    output = RunFolder(tmp_path, {})
-    for number in range(3):
-        output.write_step(step(number))
+def test_overwriting_replaces_an_earlier_run_and_nothing_else(tmp_path):
+    with RunFolder(tmp_path, {}) as output:
+        for number in range(3):
+            output.write_step(step(number))
     (tmp_path / "notes.txt").write_text("mine")
-    RunFolder(tmp_path, {}).write_step(step(0))
+    RunFolder(tmp_path, {}, overwrite=True).write_step(step(0))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["notes.txt", "step_0", "summary.json"]
 
 

@@ -1,3 +1,4 @@
+import os
 from dataclasses import dataclass, field
 
 import pytest
@@ -112,7 +113,7 @@ def test_a_file_that_is_no_text_is_refused(tmp_path):
     (tmp_path / "x.yaml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ScenarioError, match="not a readable text file"):
         read_scenario(tmp_path / "x.yaml", Scene)
-    with pytest.raises(ScenarioError, match="not a readable text file"):
+    with pytest.raises(ScenarioError, match="a folder, not a file"):
         read_scenario(tmp_path, Scene)
 
 
@@ -152,3 +153,37 @@ def test_a_tag_chooses_between_kinds_and_the_first_needs_none():
 def test_a_kind_is_checked_as_what_it_is(text, message):
     with pytest.raises(ScenarioError, match=message):
         parse_scenario(text, Either, source="either.yaml")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[" * 100_000, "line 1: nothing in a scenario is nested so deeply"),
+        ("{a: " * 100_000, "line 1: nothing in a scenario is nested so deeply"),
+        ("%YAML 1.1\n---\nlongest: 3", "no directives"),
+        ("%TAG !! tag:x,2000:\n---\nlongest: 3", "no directives"),
+        ("longest: !seconds 3", "longest has the unknown tag !seconds"),
+        ("longest: !<tag:x.org,2000:y> 3", "longest has the unknown tag tag:x.org,2000:y"),
+        ("longest: !!python/object/apply:os.system [x]", "unknown tag"),
+        ("longest: !!timestamp 3", "scenario.yaml"),
+        ("arm: {most_interactions: !!int x}", "scenario.yaml"),
+        ("--- {}\n--- {}", "not YAML"),
+        ("longest: \x00", "not YAML"),
+        ("? {}\n: 3", "scenario.yaml"),
+        ("? [a]\n: 3", "scenario.yaml"),
+    ],
+)
+def test_yaml_that_no_scenario_needs_is_one_line(tmp_path, text, says):
+    from riseg_drake.app.scenario import load_scenario
+
+    (tmp_path / "scenario.yaml").write_text(text)
+    with pytest.raises(ScenarioError) as error:
+        load_scenario(tmp_path / "scenario.yaml")
+    assert says in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_pipe_in_the_place_of_a_scenario_hangs_nobody(tmp_path):
+    os.mkfifo(tmp_path / "x.yaml")
+    with pytest.raises(ScenarioError, match="a pipe, not a file; a scenario is a YAML file"):
+        read_scenario(tmp_path / "x.yaml", Scene)

@@ -32,7 +32,7 @@ def recording(tmp_path, pushed):
 
 def segment(recording, *more):
     output = recording.parent / "out"
-    assert main(["segment", str(recording), "--output", str(output), *more]) == 0
+    assert main(["segment", str(recording), "--output", str(output), "--overwrite", *more]) == 0
     return output, json.loads((output / "summary.json").read_text())
 
 

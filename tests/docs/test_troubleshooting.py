@@ -1,6 +1,7 @@
 """docs/troubleshooting.md: every message that it quotes is provoked, and what it says of causes is tried."""
 
 import ctypes
+import errno
 import json
 import re
 import shutil
@@ -13,6 +14,7 @@ from drake import lcmt_image_array, lcmt_panda_status
 
 from riseg_drake.app.cli import main
 from riseg_drake.app.hardware import PATIENCE, HardwareError, wait_for_drivers
+from riseg_drake.app.output import RunFolder
 from riseg_drake.app.replay import Replay
 from riseg_drake.app.scenario import HARDWARE, Scenario, load_scenario
 from riseg_drake.recording.layout import RecordedFrame
@@ -131,6 +133,36 @@ def somebody_elses_folder(patch):
     main(["run", "--output", "out"])
 
 
+def earlier_run(patch):
+    earlier = RunFolder(Path("out/first"), {})
+    earlier.note(state="done")
+    for number in (0, 1):
+        Path(f"out/first/step_{number}").mkdir()
+    earlier.close()
+    main(["run", "--output", "out/first"])
+
+
+def two_at_once(patch):
+    patch.setattr("riseg_drake.app.output_folder.PATIENCE", 0.0)
+    with RunFolder(Path("out/second"), {}):
+        main(["run", "--output", "out/second"])
+
+
+def full_output(patch):
+    def full(chosen, console):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    patch.setattr("riseg_drake.app.commands.score", full)
+    main(["score", "a", "b"])
+
+
+def link_to_elsewhere(patch):
+    image = write(Path("my_recording"), drawn_frames(3)) / "rgb" / "000000.png"
+    image.rename("elsewhere.png")
+    image.symlink_to(Path("elsewhere.png").resolve())
+    main(["segment", "my_recording"])
+
+
 def without_dot(patch):
     patch.setattr(shutil, "which", lambda name: None)
     main(["diagram", "--output", "wiring.svg"])
@@ -152,6 +184,10 @@ PROVOKED = dict(
             millimetres_taken_for_metres,
             misspelt,
             somebody_elses_folder,
+            earlier_run,
+            two_at_once,
+            full_output,
+            link_to_elsewhere,
             without_dot,
         ),
         strict=True,
@@ -159,7 +195,7 @@ PROVOKED = dict(
 )
 """By the message, in the page's order."""
 
-DRAWS = {somebody_elses_folder}
+DRAWS = {somebody_elses_folder, earlier_run, two_at_once}
 """First asks whether images can be drawn."""
 
 

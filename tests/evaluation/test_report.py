@@ -4,7 +4,7 @@ import cv2
 import pytest
 
 from riseg_drake.evaluation.disturbance import Disturbance, ObjectMotion
-from riseg_drake.evaluation.figure import draw_figure
+from riseg_drake.evaluation.figure import figure_png
 from riseg_drake.evaluation.in_motion import InMotion
 from riseg_drake.evaluation.published import PUBLISHED
 from riseg_drake.evaluation.report import report_text
@@ -106,6 +106,6 @@ def test_a_switch_is_compared_scene_by_scene():
 
 
 def test_the_figure_is_a_picture(tmp_path):
-    draw_figure([GOOD, FAILED, BETTER], 5, tmp_path / "figure.png")
+    (tmp_path / "figure.png").write_bytes(figure_png([GOOD, FAILED, BETTER], 5))
     height, width, _ = cv2.imread(str(tmp_path / "figure.png")).shape
     assert min(height, width) > 500

@@ -1,12 +1,16 @@
 """What is wrong with a recording is said in one line, with file and line."""
 
 import json
+import os
+import struct
+import zlib
 
 import cv2
 import numpy as np
 import pytest
 
 from riseg_drake.app.cli import main
+from riseg_drake.recording.layout import RecordingError
 from riseg_drake.recording.reader import RecordingReader
 from tests.recording.made_recordings import drawn_frames, write
 
@@ -147,3 +151,78 @@ def test_a_mark_at_a_files_beginning_and_line_ends_of_windows_do_no_harm(recordi
     path = recording / name
     path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n"))
     assert len(list(RecordingReader(recording))) == 6
+
+
+def resized(content, width, height):
+    """A PNG whose header claims another size, with a right check sum."""
+    head = content[12:16] + struct.pack(">II", width, height) + content[24:29]
+    return content[:12] + head + struct.pack(">I", zlib.crc32(head)) + content[33:]
+
+
+@pytest.mark.parametrize("name", ["rgb/000001.png", "depth/000001.png", "label/000001.png"])
+def test_an_image_that_claims_20000_pixels_is_refused_by_its_header(recording, name, monkeypatch):
+    path = recording / name
+    path.write_bytes(resized(path.read_bytes(), 20000, 20000))
+    monkeypatch.setattr("cv2.imdecode", lambda *_: pytest.fail("it is decoded"))
+    with pytest.raises(RecordingError, match="has 20000x20000 pixels"):
+        RecordingReader(recording)
+
+
+def test_a_jpeg_of_another_size_is_not_decoded(recording, monkeypatch):
+    image = np.zeros((600, 800, 3), np.uint8)
+    (recording / "rgb" / "000000.jpg").write_bytes(cv2.imencode(".jpg", image)[1].tobytes())
+    lines_of(recording / "rgb.txt", lambda lines: [line.replace("000000.png", "000000.jpg") for line in lines])
+    reader = RecordingReader(recording)
+    monkeypatch.setattr("cv2.imdecode", lambda *_: pytest.fail("it is decoded"))
+    with pytest.raises(RecordingError, match="has 800x600 pixels"):
+        next(iter(reader))
+
+
+@pytest.mark.parametrize("name", ["rgb.txt", "depth.txt", "groundtruth.txt", "camera.json"])
+@pytest.mark.parametrize("kind", ["pipe", "device"])
+def test_a_pipe_or_a_device_in_the_place_of_a_file_is_one_line(recording, name, kind):
+    (recording / name).unlink()
+    if kind == "pipe":
+        os.mkfifo(recording / name)
+    else:
+        (recording / name).symlink_to("/dev/zero")
+    with pytest.raises(RecordingError, match=f"{name} is a {kind}, not a file"):
+        RecordingReader(recording, follow=True)
+
+
+@pytest.mark.parametrize("name", ["scenario.yaml", "run.json"])
+def test_a_pipe_in_the_place_of_a_runs_settings_is_one_line(recording, capsys, name):
+    os.mkfifo(recording / name)
+    assert main(["segment", str(recording), "--output", str(recording.parent / "out")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_file_name_of_5000_characters_is_a_missing_image(recording):
+    lines_of(recording / "rgb.txt", lambda lines: [*lines[:3], f"0.133 {'a' * 5000}.png", *lines[4:]])
+    with pytest.raises(RecordingError, match=r"line 4: .*a\.png is missing"):
+        RecordingReader(recording)
+
+
+@pytest.mark.parametrize("name", ["groundtruth.txt", "camera.json", "rgb/000002.png", "label/000002.png"])
+def test_a_link_that_leads_out_of_the_recording_is_followed_on_request_only(recording, name):
+    elsewhere = recording.parent / "elsewhere"
+    (recording / name).rename(elsewhere)
+    (recording / name).symlink_to(elsewhere)
+    with pytest.raises(RecordingError, match=r"leads out of .*recording; --follow allows that"):
+        RecordingReader(recording)
+    assert len(list(RecordingReader(recording, follow=True))) == 6
+
+
+@pytest.mark.parametrize("path", ["/etc/hostname", "../elsewhere.png", "{parent}/elsewhere.png"])
+def test_a_path_that_leads_out_of_the_recording_is_refused(recording, path):
+    (recording.parent / "elsewhere.png").write_bytes((recording / "rgb" / "000000.png").read_bytes())
+    path = path.format(parent=recording.parent)
+    lines_of(recording / "rgb.txt", lambda lines: [*lines[:3], f"0.133 {path}", *lines[4:]])
+    with pytest.raises(RecordingError, match=r"rgb\.txt: line 4: .* leads out of"):
+        RecordingReader(recording)
+
+
+def test_a_recording_behind_a_link_is_a_recording(recording):
+    link = recording.parent / "link"
+    link.symlink_to(recording)
+    assert len(list(RecordingReader(link))) == 6

@@ -1,3 +1,4 @@
+import tracemalloc
 import zlib
 
 import cv2
@@ -11,7 +12,15 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import ApplyCameraConfig, CameraConfig
 
-from riseg_drake.stations.lcm_images import ImageError, decode_image, decode_images, encode_image, encode_images
+from riseg_drake.stations.lcm_images import (
+    DamagedPictureError,
+    ImageError,
+    decode_image,
+    decode_images,
+    decode_message,
+    encode_image,
+    encode_images,
+)
 
 H, W = 48, 84
 V, U = np.mgrid[:H, :W]
@@ -206,3 +215,71 @@ def test_a_camera_that_drake_simulates_is_read(do_compress):
     assert images.time == pytest.approx(0.2)
     assert images.color[0, 0] == pytest.approx([51, 102, 204], abs=1)
     assert (images.depth == 0).all()  # nothing there: too far
+
+
+def color_of(message):
+    (image,) = [image for image in message.images if image.header.frame_name == "color"]
+    return image
+
+
+@pytest.mark.parametrize(
+    ("width", "height"), [(0, 48), (-84, 48), (84, -1), (60000, 60000), (2**31 - 1, 2**31 - 1)]
+)
+@pytest.mark.parametrize("compression", ["JPEG", "ZLIB", "NOT_COMPRESSED"])
+def test_sizes_that_cannot_be_are_refused_before_anything_is_unpacked(width, height, compression, monkeypatch):
+    image = color_of(real_message())
+    image.width, image.height = width, height
+    image.compression_method = getattr(lcmt_image, f"COMPRESSION_METHOD_{compression}")
+    monkeypatch.setattr("cv2.imdecode", lambda *_: pytest.fail("it is unpacked"))
+    with pytest.raises(DamagedPictureError, match=f"color: {width}x{height} pixels cannot be"):
+        decode_image(image)
+
+
+def test_a_camera_of_another_size_is_refused_before_anything_is_unpacked(monkeypatch):
+    monkeypatch.setattr("cv2.imdecode", lambda *_: pytest.fail("it is unpacked"))
+    with pytest.raises(ImageError, match="sends 84x48 pixels, and the scenario's intrinsics are for 640x480"):
+        decode_images(real_message(), size=(640, 480))
+
+
+def test_data_of_another_size_than_the_message_says_are_not_unpacked(monkeypatch):
+    image = color_of(real_message())
+    large = cv2.imencode(".jpg", np.zeros((3000, 3000, 3), np.uint8))[1].tobytes()
+    image.data, image.size = large, len(large)
+    monkeypatch.setattr("cv2.imdecode", lambda *_: pytest.fail("it is unpacked"))
+    with pytest.raises(DamagedPictureError, match="of 3000x3000 pixels, the message says 84x48"):
+        decode_image(image)
+
+
+def test_zlib_is_unpacked_as_far_as_the_image_has_room_for_it():
+    image = raw_image("depth", DEPTH, lcmt_image.PIXEL_FORMAT_DEPTH, lcmt_image.CHANNEL_TYPE_FLOAT32)
+    image.data = zlib.compress(DEPTH.tobytes() + bytes(10**8))
+    tracemalloc.start()
+    np.testing.assert_array_equal(decode_image(image), DEPTH)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 20 * DEPTH.nbytes
+
+
+@pytest.mark.parametrize("stride", [1, -1, 10**6])
+def test_rows_that_do_not_lie_behind_each_other_are_refused(stride):
+    image = raw_image("depth", DEPTH, lcmt_image.PIXEL_FORMAT_DEPTH, lcmt_image.CHANNEL_TYPE_FLOAT32)
+    image.row_stride = stride
+    with pytest.raises(DamagedPictureError, match="rows of 336 bytes"):
+        decode_image(image)
+
+
+def test_images_of_other_formats_in_the_place_of_a_jpeg_are_damage():
+    image = color_of(real_message())
+    tiff = cv2.imencode(".tiff", np.zeros((48, 84), np.float64))[1].tobytes()
+    for data in (tiff, b"", bytes(image.data)[:-30]):
+        image.data, image.size = data, len(data)
+        with pytest.raises(DamagedPictureError, match="color: damaged JPEG or PNG data"):
+            decode_image(image)
+
+
+def test_bytes_that_are_no_message_are_damage():
+    whole = real_message().encode()
+    for data in (b"", whole[:40], whole[:100], b"x" * 200, whole[:20] + b"\xff" * 40):
+        with pytest.raises(DamagedPictureError):
+            decode_message(data)
+    assert decode_message(whole).num_images == len(real_message().images)

@@ -1,0 +1,47 @@
+"""The door for model files (URDF, SDF, MJCF): whole XML of a size that can be, before Drake's parsers see it.
+
+These end the whole process at some damage, follow a pipe for ever, and go down a tree without an end.
+"""
+
+from pathlib import Path
+from xml.parsers import expat
+
+from riseg_drake.host.files import FileError, read_bytes
+
+MOST_BYTES = 2**25
+"""Of one file; meshes lie beside it."""
+DEEPEST = 100
+"""Elements in each other."""
+
+
+class ModelFileError(ValueError):
+    """Why a file is no model, in a few words without its name."""
+
+
+def check_model(path: Path) -> None:
+    """Raise ModelFileError unless a file holds XML that a parser of models can be given."""
+    try:
+        content = read_bytes(path, MOST_BYTES)
+    except FileError as error:
+        raise ModelFileError(str(error).removeprefix(f"{path} ")) from None
+    depth = 0
+
+    def begin(name: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > DEEPEST:
+            raise ModelFileError("its elements are nested too deeply")
+
+    def end(name: str) -> None:
+        nonlocal depth
+        depth -= 1
+
+    def declare(*_: object) -> None:
+        raise ModelFileError("it declares entities of its own, which no model needs")
+
+    parser = expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler, parser.EntityDeclHandler = begin, end, declare
+    try:
+        parser.Parse(content, True)
+    except expat.ExpatError as error:
+        raise ModelFileError(f"it is not whole XML ({error})") from None

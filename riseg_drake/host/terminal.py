@@ -1,0 +1,42 @@
+"""What a person is told: one line, whatever a file's name or a library's words hold."""
+
+import os
+import select
+import sys
+from contextlib import suppress
+
+LONGEST_LINE = 600
+"""Characters; of a longer one the middle is left out."""
+
+
+def one_line(text: object) -> str:
+    """The words of a text in one line that does nothing to a terminal; a very long one loses its middle."""
+    words = " ".join(str(text).split())
+    line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in words)
+    if len(line) <= LONGEST_LINE:
+        return line
+    half = (LONGEST_LINE - 5) // 2
+    return f"{line[:half]} ... {line[-half:]}"
+
+
+def tell_error(text: object) -> None:
+    """Say on the error stream, in one line, what is wrong; silently where nobody can hear it."""
+    with suppress(OSError, ValueError):
+        print(f"riseg: {one_line(text)}", file=sys.stderr, flush=True)
+
+
+def nobody_reads() -> bool:
+    """Whether the reader of our output is gone; otherwise some other pipe has broken, which is a fault."""
+    output = select.poll()
+    output.register(sys.stdout.fileno(), 0)
+    return any(events & select.POLLERR for _, events in output.poll(0))
+
+
+def can_write() -> None:
+    """Send on what waits to be written to the output. Raises OSError where that cannot be."""
+    sys.stdout.flush()
+
+
+def drop_output() -> None:
+    """Write nothing more to the output: what waits for it there would be an error at the end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,0 +1,199 @@
+"""Commands stopped at random moments: exit codes, whole files, no process left, and evaluations that go on."""
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.faults.commands import Stoppable, stoppables
+from tests.faults.tally import Tally
+
+PATIENCE = 60.0
+"""Within which a command that was told to stop must have ended, s, or twice its whole length: a busy machine is
+slow in all that it does."""
+LONGEST = 3600.0
+"""Of a command that nobody stops, s."""
+LEFT_PATIENCE = 5.0
+"""Within which its other processes must have, s."""
+PAUSE = 1.0
+"""Between SIGSTOP and SIGCONT, s."""
+EARLIEST = 0.15
+"""Of the moments, s: before, Python itself is still coming up and hears Ctrl-C in its own way."""
+SIGNALS = {"INT": signal.SIGINT, "TERM": signal.SIGTERM, "KILL": signal.SIGKILL, "STOP": signal.SIGSTOP}
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a command ended."""
+
+    code: int
+    errors: str
+    seconds: float
+    was_stopped: bool
+
+
+def try_stops(
+    names: list[str], signals: list[str], count: int, seed: int, tally: Tally, place: Path | None
+) -> None:
+    """Stop each command `count` times by each signal, at moments spread over its whole length."""
+    place = place or Path(tempfile.mkdtemp(prefix="riseg_faults_"))
+    rng = random.Random(seed)
+    for name in names:
+        command = stoppables(place)[name]
+        right = place / f"right_{name}"
+        length = _undisturbed(command, right)
+        print(f"{name}: {length:.1f} s undisturbed", flush=True)
+        for each in signals:
+            for number in range(count):
+                output = place / f"stopped_{name}"
+                moment, ended = _stop(command, output, SIGNALS[each], rng, length, number / count)
+                complaints = _complaints(command, output, right, SIGNALS[each], ended)
+                if command.goes_on and not complaints:
+                    complaints = _complaints_of_going_on(command, output, right)
+                tally.enter(f"{name}, SIG{each}", complaints, f"after {moment:.2f} s of {length:.1f}")
+                if complaints:
+                    shutil.move(output, place / f"wrong_{name}_{each}_{number}_{seed}")
+
+
+def _undisturbed(command: Stoppable, right: Path) -> float:
+    if right.exists():
+        shutil.rmtree(right)
+    ended = _run(command, right)
+    assert ended.code == 0, ended.errors
+    return ended.seconds
+
+
+def _stop(
+    command: Stoppable, output: Path, number: int, rng: random.Random, length: float, share: float
+) -> tuple[float, Ended]:
+    """Stop a command at a random moment; one that had ended before is tried again with an earlier one."""
+    while True:
+        moment = EARLIEST + (length - EARLIEST) * ((share + rng.random()) % 1)
+        shutil.rmtree(output, ignore_errors=True)
+        ended = _run(command, output, moment, number, length)
+        if ended.was_stopped:
+            return moment, ended
+        share, length = rng.random(), 0.9 * length
+
+
+def _run(
+    command: Stoppable, output: Path, moment: float | None = None, number: int = 0, length: float = 0.0
+) -> Ended:
+    """Run a command to its end, or send it a signal at a moment, s; undisturbed it takes `length`, s."""
+    beside = [_start(arguments) for arguments in command.beside]
+    process = _start((*command.arguments, "--output", str(output)))
+    start, was_stopped = time.monotonic(), False
+    try:
+        if moment is not None:
+            try:
+                process.wait(moment)
+            except subprocess.TimeoutExpired:
+                # As a terminal does it, Ctrl-C goes to the whole group; what kills goes to the one process.
+                send = os.killpg if number == signal.SIGINT else os.kill
+                send(process.pid, number)
+                was_stopped = True
+                if number == signal.SIGSTOP:
+                    time.sleep(PAUSE)
+                    os.kill(process.pid, signal.SIGCONT)
+        limit = max(PATIENCE, 2 * length) if was_stopped and number != signal.SIGSTOP else LONGEST
+        try:
+            _, errors = process.communicate(timeout=limit)
+            code = process.returncode
+        except subprocess.TimeoutExpired:
+            code, errors = -999, f"still there {limit:g} s after the signal"
+        seconds = time.monotonic() - start
+        left = _left(process.pid)
+        if left:
+            errors += f"\nleft: {left}"
+    finally:
+        for each in (process, *beside):
+            _end(each)
+    return Ended(code, errors, seconds, was_stopped)
+
+
+def _start(arguments: tuple[str, ...]) -> subprocess.Popen:
+    return subprocess.Popen(
+        [sys.executable, "-m", "riseg_drake", *arguments],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=_hear_signals,
+    )
+
+
+def _hear_signals() -> None:
+    """A trial in the background of a shell ignores Ctrl-C, and so would what it starts."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
+def _end(process: subprocess.Popen) -> None:
+    """End a command with all its processes."""
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def _left(session: int) -> list[str]:
+    """Processes of a session that are still there after a while, by their command lines."""
+    deadline = time.monotonic() + LEFT_PATIENCE
+    while True:
+        left = [words for pid, words in _processes(session) if pid != session]
+        if not left or time.monotonic() > deadline:
+            return left
+        time.sleep(0.1)
+
+
+def _processes(session: int) -> list[tuple[int, str]]:
+    """Living processes of a session."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            state, _, _, its_session = (folder / "stat").read_text().rpartition(")")[2].split()[:4]
+            words = (folder / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
+        except (OSError, ValueError):
+            continue
+        if int(its_session) == session and state not in "ZX":
+            found.append((int(folder.name), words[:120]))
+    return found
+
+
+def _complaints(command: Stoppable, output: Path, right: Path, number: int, ended: Ended) -> list[str]:
+    expected = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -9, signal.SIGSTOP: 0}[number]
+    finished = ended.code == 0 and '"state": "done"' in _text(output / "summary.json")  # it came too late
+    complaints = (
+        []
+        if ended.code == expected or finished
+        else [f"exit code {ended.code}, not {expected}: {ended.errors}"]
+    )
+    if finished:
+        print(f"{command.name}: the signal came after its end")
+    lines = ended.errors.strip().splitlines()
+    if number in (signal.SIGINT, signal.SIGTERM) and len(lines) != (not finished):
+        complaints.append(f"{len(lines)} lines of errors: {ended.errors[-600:]}")
+    if "Traceback" in ended.errors or "left: " in ended.errors:
+        complaints.append(ended.errors[-600:])
+    return complaints + (command.complaints(output, right) if output.exists() else [])
+
+
+def _text(path: Path) -> str:
+    return path.read_text() if path.exists() else ""
+
+
+def _complaints_of_going_on(command: Stoppable, output: Path, right: Path) -> list[str]:
+    ended = _run(command, output)
+    if ended.code:
+        return [f"going on: exit code {ended.code}: {ended.errors}"]
+    complaints = command.complaints(output, right)
+    if '"state": "done"' not in (output / "summary.json").read_text():
+        complaints.append("going on: not done")
+    return [f"going on: {complaint}" for complaint in complaints]

@@ -1,0 +1,44 @@
+"""Model files are looked at before Drake's parsers see them."""
+
+import os
+
+import pytest
+
+from riseg_drake.host.model_files import ModelFileError, check_model
+from riseg_drake.stations.object_models import SceneError, find_models
+
+BOX = """<robot name="box"><link name="box"><inertial><mass value="0.1"/>
+<inertia ixx="1e-4" ixy="0" ixz="0" iyy="1e-4" iyz="0" izz="1e-4"/></inertial>
+<collision><geometry><box size="0.1 0.1 0.05"/></geometry></collision></link></robot>"""
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (BOX.replace("0.1 0.1 0.05", "0.1 0.1"), "cannot be read"),
+        (BOX.replace("0.1 0.1 0.05", "nan 0.1 0.1"), "cannot be read"),
+        (BOX[:-30], "not whole XML"),
+        ("<a>" * 200 + "</a>" * 200, "nested too deeply"),
+        ('<!DOCTYPE a [<!ENTITY x "y">]><a>&x;</a>', "entities of its own"),
+        ("", "not whole XML"),
+    ],
+)
+def test_a_model_that_cannot_be_is_one_line(tmp_path, content, says):
+    (tmp_path / "box.urdf").write_text(content)
+    with pytest.raises(SceneError, match=says) as error:
+        find_models(str(tmp_path))
+    assert "box.urdf" in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_pipe_in_the_place_of_a_model_hangs_nobody(tmp_path):
+    os.mkfifo(tmp_path / "box.urdf")
+    with pytest.raises(SceneError, match=r"box\.urdf cannot be read: is a pipe, not a file"):
+        find_models(str(tmp_path))
+
+
+def test_a_right_model_passes(tmp_path):
+    (tmp_path / "box.urdf").write_text(BOX)
+    check_model(tmp_path / "box.urdf")
+    with pytest.raises(ModelFileError):
+        check_model(tmp_path / "nowhere.urdf")

@@ -1,0 +1,113 @@
+"""Ctrl-C, kill and the end of a parent: heard once, never lost, and never a traceback."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from riseg_drake.app.cli import main
+from riseg_drake.host.processes import STOP_SIGNALS, stopped_by_signals, undisturbed
+
+STOPPED_WHILE_IMPORTING = """
+import os, signal, sys
+
+class Pydrake:
+    def find_spec(self, name, path=None, target=None):
+        if name.startswith("pydrake"):
+            try:
+                os.kill(os.getpid(), signal.{name})
+                for _ in range(1000): pass  # here the signal is heard
+            except KeyboardInterrupt:  # as modules of C++ do
+                raise ImportError("initialization failed")
+
+sys.meta_path.insert(0, Pydrake())
+from riseg_drake.__main__ import program
+sys.argv = ["riseg", "run"]
+raise SystemExit(program())
+"""
+CHILD = """
+import os, sys, time
+from riseg_drake.host.processes import end_with_parent
+if os.fork() == 0:
+    end_with_parent(int(os.getppid()))
+    print(os.getpid(), flush=True)
+    time.sleep(600)
+time.sleep(600)
+"""
+
+
+@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
+def test_ctrl_c_while_drake_is_imported_is_one_line_and_its_own_exit_code(name, code):
+    words = [sys.executable, "-c", STOPPED_WHILE_IMPORTING.format(name=name)]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (code, "riseg: stopped\n")
+
+
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
+)
+def test_every_stop_signal_is_heard_as_ctrl_c(monkeypatch, capsys, number, code):
+    monkeypatch.setattr(
+        "riseg_drake.app.commands.diagram", lambda *_: os.kill(os.getpid(), number) or time.sleep(9)
+    )
+    before = [signal.getsignal(each) for each in STOP_SIGNALS]
+    assert main(["diagram"]) == code
+    assert capsys.readouterr().err == "riseg: stopped\n"
+    assert [signal.getsignal(each) for each in STOP_SIGNALS] == before
+
+
+def test_what_a_library_makes_of_ctrl_c_is_still_ctrl_c(monkeypatch, capsys):
+    def translated(*_):
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(9)
+        except KeyboardInterrupt:
+            raise RuntimeError("initialization failed") from None
+
+    monkeypatch.setattr("riseg_drake.app.commands.diagram", translated)
+    assert main(["diagram"]) == 130
+    assert capsys.readouterr().err == "riseg: stopped\n"
+
+
+def test_ctrl_c_waits_until_what_must_not_be_disturbed_is_done():
+    done = []
+
+    def write():
+        with undisturbed():
+            os.kill(os.getpid(), signal.SIGINT)
+            done.append("whole")
+        done.append("never")
+
+    with stopped_by_signals("") as stop, pytest.raises(KeyboardInterrupt):
+        write()
+    assert done == ["whole"]
+    assert stop.exit_code == 130
+
+
+def test_what_is_ignored_stays_ignored():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+    try:
+        with stopped_by_signals(""):
+            os.kill(os.getpid(), signal.SIGHUP)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_a_child_ends_with_its_parent_however_that_ends():
+    parent = subprocess.Popen([sys.executable, "-c", CHILD], stdout=subprocess.PIPE, text=True)
+    child = int(parent.stdout.readline())
+    parent.kill()
+    parent.wait()
+    for _ in range(1000):
+        try:
+            os.kill(child, 0)
+        except ProcessLookupError:
+            return
+        with open(f"/proc/{child}/stat") as stat:
+            if stat.read().rpartition(")")[2].split()[0] == "Z":
+                return  # dead, and nobody has asked for its exit code
+        time.sleep(0.01)
+    pytest.fail("the child is still there")
