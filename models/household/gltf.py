@@ -1,4 +1,4 @@
-"""Writes a surface with one texture as a glTF 2.0 file, whose material has a gloss; OBJ files have none here."""
+"""Writes a surface with one texture as a glTF 2.0 file: only there a material has a gloss for Drake."""
 
 import base64
 import json

@@ -58,7 +58,9 @@ def picture(sheet: NDArray, x: float, y: float, width: float, height: float, pat
         part[:] = pattern(_points(part), rng)
 
 
-def word(sheet: NDArray, x: float, y: float, height: float, text: str, color: Color, bold: float = 0.9) -> float:
+def word(
+    sheet: NDArray, x: float, y: float, height: float, text: str, color: Color, bold: float = 0.9
+) -> float:
     """Print a word of capitals, `height` mm high, from (x, y) on; returns its width in mm."""
     dots = np.hstack(
         [np.pad([[int(b) for b in f"{int(row, 16):05b}"] for row in _rows(c)], ((0, 0), (0, 1))) for c in text]

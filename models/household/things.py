@@ -1,4 +1,5 @@
 """The household things: shape, print, weight and gloss of each. Lengths in mm."""
+# ruff: noqa: E501  (a table: a thing a line)
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -44,7 +45,9 @@ def _can(radius: float, height: float) -> list[tuple[float, float]]:
     ]  # fmt: skip
 
 
-def _bottle(radius: float, height: float, neck: float, shoulder: float, cap: float) -> list[tuple[float, float]]:
+def _bottle(
+    radius: float, height: float, neck: float, shoulder: float, cap: float
+) -> list[tuple[float, float]]:
     """A bottle: straight up to the shoulder, narrowing to a neck, a cap on top."""
     rise = height - cap - shoulder
     curve = [
@@ -69,7 +72,9 @@ def _cup(radius: float, foot: float, height: float, wall: float) -> list[tuple[f
 def _bowl(radius: float, foot: float, height: float, wall: float) -> list[tuple[float, float]]:
     """A bowl: a foot, a wall that opens upwards, and the inside down again."""
     t = np.linspace(0.0, 1.0, 6)[1:]
-    out = [(foot + (radius - foot) * float(np.sin(a * np.pi / 2)), 3.0 + (height - 4.0) * float(a**1.5)) for a in t]
+    out = [
+        (foot + (radius - foot) * float(np.sin(a * np.pi / 2)), 3.0 + (height - 4.0) * float(a**1.5)) for a in t
+    ]
     inside = [(r - wall, max(z, wall + 3.0)) for r, z in reversed(out)]
     return [
         (0, 0.0), (foot - 2, 0.0), (foot, 3.0), *out, (radius - 0.5 * wall, height),
@@ -101,7 +106,13 @@ def _turned(
 
 
 def _slab(
-    name: str, drawing: Field, profile: Profile, pattern: Pattern, mass: float, roughness: float = MATT, metallic: float = 0.0
+    name: str,
+    drawing: Field,
+    profile: Profile,
+    pattern: Pattern,
+    mass: float,
+    roughness: float = MATT,
+    metallic: float = 0.0,
 ) -> Thing:
     return Thing(name, lambda rng: slab(drawing, profile, pattern, rng), mass, roughness, metallic)
 
@@ -135,7 +146,7 @@ def _sheet(art: p.Art, length: float, width: float) -> Pattern:
 def _buttons(points: NDArray, rng: np.random.Generator) -> NDArray:
     """The top of a remote control: black, with rows of keys."""
     image = _colored(p.BLACK)(points, rng)
-    key = np.abs(np.mod(points + (5.5, 5.5), 11.0) - 5.5)
+    key = np.abs(np.mod(points + 5.5, 11.0) - 5.5)
     on = (np.hypot(key[..., 0], key[..., 1]) < 3.2) & (np.abs(points[..., 1]) < 16) & (points[..., 0] > -35)
     image[on & (points[..., 0] < 52)] = (0.28, 0.28, 0.30)
     image[np.hypot(points[..., 0] - 60, points[..., 1]) < 3.5] = p.RED

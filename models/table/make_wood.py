@@ -2,19 +2,19 @@
 
     python -m riseg_drake.models.table.make_wood [OUTPUT]
 
-writes wood.jpg; without OUTPUT, beside this file.
+writes wood.png; without OUTPUT, beside this file.
 """
 
 import argparse
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from riseg_drake.models.household.printing import RESOLUTION, wood
+from riseg_drake.models.objects.texture import write_png
 
 BOARDS = 12
-TEXELS = (1400, 1600)  # a millimetre each, on the built-in table
+TEXELS = (840, 960)  # 1.7 mm each, on the built-in table
 
 
 def table_top(rng: np.random.Generator) -> NDArray:
@@ -27,7 +27,8 @@ def table_top(rng: np.random.Generator) -> NDArray:
         sheet = wood(width * RESOLUTION, board * RESOLUTION, rng, (0.58 * tone, 0.39 * tone, 0.22 * tone))
         sheet[:2] *= 0.45  # the joint
         rows.append(sheet)
-    return np.round(255 * np.clip(np.vstack(rows), 0, 1)).astype(np.uint8)
+    # Five bits a channel: the file is a third as large, and a camera sees no difference.
+    return (np.round(31 * np.clip(np.vstack(rows), 0, 1)) * (255 / 31)).astype(np.uint8)
 
 
 def main() -> None:
@@ -35,8 +36,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Draw the wooden table top.")
     parser.add_argument("output", nargs="?", type=Path, default=Path(__file__).parent)
     image = table_top(np.random.default_rng(5))
-    path = parser.parse_args().output / "wood.jpg"
-    cv2.imwrite(str(path), image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 78])
+    write_png(parser.parse_args().output / "wood.png", image)
 
 
 if __name__ == "__main__":

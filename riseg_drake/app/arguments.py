@@ -49,7 +49,14 @@ def command_line() -> argparse.ArgumentParser:
         "Run many scenes, and put their scores into the paper's table and figure.\n"
         "An evaluation that was stopped goes on where it was when the same command is given again.",
     )
-    evaluate.add_argument("--scenes", type=_positive, default=20, metavar="N", help="how many (20)")
+    evaluate.add_argument(
+        "--suite",
+        metavar="NAME",
+        help="scenes of several kinds, a row each: clutter, or a folder of YAML files, one a kind",
+    )
+    evaluate.add_argument(
+        "--scenes", type=_positive, metavar="N", help="how many (20); of a suite, of each kind (5)"
+    )
     evaluate.add_argument(
         "--seed",
         type=int,

@@ -18,10 +18,16 @@ def run(chosen: argparse.Namespace, console: Console) -> None:
 
 def evaluate(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg evaluate`."""
+    if chosen.suite is not None:
+        from riseg_drake.app.suite import suite_command
+
+        return suite_command(
+            chosen.suite, chosen.scenes, chosen.seed, chosen.jobs, chosen.output, chosen.dask, console
+        )
     from riseg_drake.app.evaluate import evaluate_command
 
     evaluate_command(
-        chosen.scenes,
+        chosen.scenes or 20,
         chosen.seed,
         chosen.objects,
         chosen.jobs,

@@ -49,7 +49,7 @@ def report_text(scenes: Sequence[SceneResult], about: Mapping[str, object], last
 
 def score_cells(scores: Scores) -> list[str]:
     """The seven figures of the paper's table, in percent."""
-    return [_percent(share) for share in table_figures(scores)]
+    return [percent(share) for share in table_figures(scores)]
 
 
 def table_figures(scores: Scores) -> tuple[float, ...]:
@@ -77,7 +77,7 @@ def _score_section(scenes: Sequence[SceneResult], last_step: int) -> str:
         f"{sum(scene.interactions >= i for scene in scenes)} reached {i}" for i in range(1, last_step + 1)
     )
     return (
-        _table(("method", "step i", *_HEAD), rows)
+        markdown_table(("method", "step i", *_HEAD), rows)
         + f"""
 In percent. Step i is after i interactions; *found* is the share of objects with Overlap F above
 {FOUND_ABOVE_F:.0%}. Each figure is the unweighted mean over the {len(scenes)} scenes, so the mean F is not
@@ -106,7 +106,7 @@ def _disturbance_section(scenes: Sequence[SceneResult], last_step: int) -> str:
         "left the table",
     )
     return (
-        _table(head, rows)
+        markdown_table(head, rows)
         + f"""
 The pushed object is the one that the push was planned to meet. Tilt is against the start of the run; more
 than {TOPPLED_DEG:g} degrees count as toppled, also where a ball has merely rolled.
@@ -132,7 +132,7 @@ def _scene_section(scenes: Sequence[SceneResult], last_step: int) -> str:
         last = carried(scene.scores, last_step)[-1]
         picture = f"[{scene.name}]({scene.name}/step_{scene.interactions}/overlay.png)"
         found = "–" if isnan(last.objects_true) else f"{last.objects_found:g} of {last.objects_true:g}"
-        figures = [_percent(last.overlap_f), _percent(last.boundary_f), found]
+        figures = [percent(last.overlap_f), percent(last.boundary_f), found]
         rows.append(
             [
                 picture if scene.scores else scene.name,
@@ -142,7 +142,7 @@ def _scene_section(scenes: Sequence[SceneResult], last_step: int) -> str:
                 scene.failure or scene.end,
             ]
         )
-    return _table(("scene", "seed", "interactions", "Overlap F", "Boundary F", "found", "end"), rows)
+    return markdown_table(("scene", "seed", "interactions", "Overlap F", "Boundary F", "found", "end"), rows)
 
 
 def _failures(scenes: Sequence[SceneResult]) -> str:
@@ -161,7 +161,7 @@ def _ablation_section(scenes: Sequence[SceneResult], last_step: int) -> str:
         mean = step_means(scores, last_step)[-1]
         rows.append([switch, *score_cells(mean), _difference(scores, ours, last_step)])
     return (
-        _table(("version", *_HEAD, "Overlap F against ours"), rows)
+        markdown_table(("version", *_HEAD, "Overlap F against ours"), rows)
         + """
 After the last interaction, in percent, means over the same scenes. The runs were made once, by this
 project's version, which chose the pushes; each row segments the recorded frames again with one switch as
@@ -189,7 +189,8 @@ def _difference(scores: Sequence[Sequence[Scores]], ours: Sequence[Sequence[Scor
     return f"{difference.mean():+.1f} ± {difference.std(ddof=1) / np.sqrt(len(difference)):.1f}"
 
 
-def _table(head: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
+def markdown_table(head: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table in Markdown, its figures to the right."""
     head = list(head)
     lines = [
         head,
@@ -203,7 +204,8 @@ def _strong(text: str, strong: bool) -> str:
     return f"**{text}**" if strong else text
 
 
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
+    """A share in percent, or a dash for what is unknown."""
     return _number(100 * share, 1)
 
 

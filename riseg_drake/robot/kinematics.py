@@ -190,29 +190,41 @@ def pose_error(X_WA: NDArray, X_WB: NDArray) -> NDArray[np.float64]:
 
 
 def observe_pose(
-    p_WT: Sequence[float] | NDArray, height: float, X_EC: NDArray, yaw: float = 0.0
+    p_WT: Sequence[float] | NDArray, height: float, X_EC: NDArray, yaw: float = 0.0, tilt: float = 0.0
 ) -> NDArray[np.float64]:
-    """X_WE [4, 4] with the camera looking straight down at p_WT [3] from `height` m above it.
+    """X_WE [4, 4] with the camera looking at p_WT [3] from `height` m above it.
 
     `yaw` is the direction of the image's upper edge about W's z axis; 0 is away from the robot, so that
-    the pusher stands on the robot's side of what is looked at.
+    the pusher stands on the robot's side of what is looked at. `tilt` is the angle between the view and
+    straight down, rad: the camera stands back, and what is far is higher in the image.
     """
     X_WE = tip_pointing_down(np.zeros(3), yaw)
+    x, y, z = X_EC[:3, 0]  # the image's own axis to the right, about which the view is tilted up
+    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    X_WE[:3, :3] = X_WE[:3, :3] @ (np.eye(3) + np.sin(tilt) * K + (1 - np.cos(tilt)) * K @ K)
     p_EC_W = X_WE[:3, :3] @ X_EC[:3, 3]
-    X_WE[:3, 3] = np.add(p_WT, [0, 0, height]) - p_EC_W
+    back = height * np.tan(tilt)
+    X_WE[:3, 3] = np.add(p_WT, [-back * np.cos(yaw), -back * np.sin(yaw), height]) - p_EC_W
     return X_WE
 
 
 def observation_posture(
-    kinematics: PandaKinematics, centre_W: Sequence[float], height: float, given: Sequence[float] = ()
+    kinematics: PandaKinematics,
+    centre_W: Sequence[float],
+    height: float,
+    given: Sequence[float] = (),
+    yaw: float = 0.0,
+    tilt: float = 0.0,
 ) -> NDArray[np.float64]:
-    """Joint angles [7], rad, to look from: those given, or looking straight down at a point of the table.
+    """Joint angles [7], rad, to look from: those given, or looking at a point of the table.
 
     Args:
         kinematics: of the arm.
         centre_W: the point's x and y in W, m.
         height: of the camera above it, m.
         given: joint angles, rad, to be used instead; may be empty.
+        yaw: of the image's upper edge, rad, as in `observe_pose`.
+        tilt: of the view from straight down, rad.
 
     Raises:
         ValueError: these are not seven, or the arm cannot look from there.
@@ -221,10 +233,11 @@ def observation_posture(
         if len(given) != 7:
             raise ValueError(f"start_position: {len(given)} angles; expected 7, in rad")
         return np.array(given, np.float64)
-    q = kinematics.solve_ik(observe_pose([*centre_W, 0.0], height, kinematics.X_EC))
+    q = kinematics.solve_ik(observe_pose([*centre_W, 0.0], height, kinematics.X_EC, yaw, tilt))
     if q is None:
         raise ValueError(
-            f"observe_height: no posture looks at {list(centre_W)} from {height} "
-            "m; 0.5 m above (0.5, 0) is within reach"
+            f"observe_height: no posture looks at {list(centre_W)} from {height} m"
+            + (f", {tilt:g} rad from straight down, upper edge to {yaw:g} rad" if tilt or yaw else "")
+            + "; 0.5 m above (0.5, 0) is within reach"
         )
     return q

@@ -37,7 +37,7 @@ def lay_out(
 
     Args:
         shapes: footprints about their bodies' origins.
-        gaps: how far each stays away from what it meets, m; asked for one by one, so that they may be drawn, too.
+        gaps: how far each stays away from what it meets, m; asked for one by one: they may be drawn.
         habit: how they come in.
         rng: draws them.
     """

@@ -45,7 +45,9 @@ def find_models(folders: str | Sequence[str], names: Sequence[str] = ()) -> list
     """
     paths: dict[str, Path] = {}
     for folder in map(_resolve, [folders] if isinstance(folders, str) else folders):
-        found = [path for end in ("sdf", "urdf") for deep in ("", "*/") for path in folder.glob(f"{deep}*.{end}")]
+        found = [
+            path for end in ("sdf", "urdf") for deep in ("", "*/") for path in folder.glob(f"{deep}*.{end}")
+        ]
         if not found:
             raise SceneError(
                 f"objects: no models in {folder}; expected *.sdf or *.urdf files, there or one folder down"

@@ -9,10 +9,10 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from riseg_drake.stations.layouts import Habit, Spot, centred, lay_out
 from riseg_drake.stations.object_models import ObjectModel, SceneError, find_model, find_models
-from riseg_drake.stations.placed_object import PlacedObject, add_scene, object_id_table
+from riseg_drake.stations.placed_object import PlacedObject
 from riseg_drake.stations.settling import lay_pile, settle
 
-__all__ = ["PlacedConfig", "PlacedObject", "SceneConfig", "SceneError", "add_scene", "make_scene", "object_id_table"]
+__all__ = ["PlacedConfig", "SceneConfig", "draw_scene", "make_scene", "place_scene"]
 
 DROP = 2e-4  # m; how far above its resting height an object starts
 LAYOUTS = 20  # whole layouts tried before a scene is called impossible
@@ -32,7 +32,7 @@ _LAYOUTS = {
     "spread": _Layout(4, 6, 0.15, Habit()),
     "packed": _Layout(4, 6, 0.17, Habit(right_angles=True, slides=True)),
     "crowd": _Layout(8, 12, 0.21, Habit(slides=True)),
-    "pile": _Layout(5, 7, 0.19, Habit()),
+    "pile": _Layout(5, 7, 0.20, Habit()),
 }
 
 
@@ -65,7 +65,7 @@ class SceneConfig:
     """Middle of the work area on the table, x and y in W, m."""
     radius: float | None = None
     """No part of an object is further from the middle than this, m; if left out 0.15, packed 0.17, in a pile
-    0.19, in a crowd 0.21."""
+    0.20, in a crowd 0.21."""
     touch_probability: float = 0.6
     """How likely, in `spread`, an object is laid against another; else it gets a gap."""
     touch_gap: float = 0.001

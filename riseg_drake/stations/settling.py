@@ -29,7 +29,7 @@ DROP = 0.004
 """m; from how high above the pile it is let go."""
 TILT = 0.3
 """rad; how far it is turned out of its modelled posture, at most, about each of two axes."""
-SCATTER = 0.035
+SCATTER = 0.028
 """m; how far from the middle, along x and y, it is laid."""
 
 TABLE = 0
@@ -64,10 +64,17 @@ class SettlingTable:
         self._simulator = Simulator(builder.Build())
         self._context = self._plant.GetMyContextFromRoot(self._simulator.get_context())
 
+    def lay(self, number: int, X_WB: RigidTransform) -> None:
+        """Put an object, by its place in the sequence, somewhere else, at rest."""
+        body = self._bodies[number]
+        self._plant.SetFloatingBaseBodyPoseInWorldFrame(self._context, body, X_WB)
+        self._plant.SetVelocities(self._context, body.model_instance(), np.zeros(6))
+
     def settle(self, longest: float) -> bool:
         """Let go until all are at rest, or `longest` s are over; whether they are at rest."""
+        start = self._simulator.get_context().get_time()
         for time in np.arange(0.2, longest, 0.1):
-            self._simulator.AdvanceTo(time)
+            self._simulator.AdvanceTo(start + time)
             velocities = [body.EvalSpatialVelocityInWorld(self._context) for body in self._bodies]
             if all(
                 np.linalg.norm(V.translational()) < STILL[0] and np.linalg.norm(V.rotational()) < STILL[1]
@@ -107,19 +114,23 @@ def lay_pile(
     models: Sequence[ObjectModel], centre_W: Sequence[float], rng: np.random.Generator
 ) -> list[PlacedObject] | None:
     """Objects laid one after the other onto one place; None if they do not come to rest as a pile."""
-    placed: list[PlacedObject] = []
-    for model in models:
-        tilt = TILT if placed else 0.0
+    row = [[*np.add(centre_W, [-1.5, 0.25 * k]), -model.footprint.bottom] for k, model in enumerate(models)]
+    waiting = [  # out of the way
+        PlacedObject(model, RigidTransform(model.X_WB.rotation(), p_W))
+        for model, p_W in zip(models, row, strict=True)
+    ]
+    table = SettlingTable(waiting, centre_W)
+    for k, model in enumerate(models):
+        tilt = TILT if k else 0.0
         turn = RollPitchYaw([*rng.uniform(-tilt, tilt, 2), rng.uniform(-np.pi, np.pi)])
         R_WB = turn.ToRotationMatrix().multiply(model.X_WB.rotation())
         p_W = np.array([*np.add(centre_W, rng.uniform(-SCATTER, SCATTER, 2)), 0.0])
-        p_W[2] = _height_below(placed, RigidTransform(R_WB, p_W), model)
-        table = SettlingTable([*placed, PlacedObject(model, RigidTransform(R_WB, p_W))], centre_W)
+        p_W[2] = _height_below(table.objects()[:k], RigidTransform(R_WB, p_W), model)
+        table.lay(k, RigidTransform(R_WB, p_W))
         table.settle(LAYING)
-        placed = table.objects()
-    table = SettlingTable(placed, centre_W)
-    at_rest = table.settle(LONGEST_OF_A_PILE)
-    return table.objects() if at_rest and is_pile(table.touching(), len(models)) else None
+    if not table.settle(LONGEST_OF_A_PILE) or not is_pile(table.touching(), len(models)):
+        return None
+    return _centred(table.objects(), centre_W)
 
 
 def is_pile(touching: set[frozenset[int]], count: int) -> bool:
@@ -128,6 +139,14 @@ def is_pile(touching: set[frozenset[int]], count: int) -> bool:
     against = set().union(*among)
     on_table = set().union(*(pair for pair in touching if TABLE in pair)) - {TABLE}
     return 2 * len(against) >= count and len(against - on_table) > 0
+
+
+def _centred(placed: Sequence[PlacedObject], centre_W: Sequence[float]) -> list[PlacedObject]:
+    """The same, moved along the table so that the middle of what they cover is there."""
+    corners = np.vstack([item.X_WB.multiply(item.model.corners.T).T for item in placed])[:, :2]
+    shift = np.array([*np.subtract(centre_W, 0.5 * (corners.min(axis=0) + corners.max(axis=0))), 0.0])
+    moved = RigidTransform(shift)
+    return [replace(item, X_WB=moved.multiply(item.X_WB)) for item in placed]
 
 
 def _height_below(placed: Sequence[PlacedObject], X_WB: RigidTransform, model: ObjectModel) -> float:

@@ -90,6 +90,11 @@ class SimulatedStationConfig:
     """Joint angles at the start, rad, 7; empty: looking straight down at the middle of the work area."""
     observe_height: float = 0.5
     """Height of the camera above the table at the start, m; unused where start_position is given."""
+    observe_tilt: float = 0.0
+    """How far the camera then looks away from straight down, rad; 0.785 is a view at 45 degrees."""
+    observe_yaw: float = 0.0
+    """Direction of its image's upper edge about W's z axis, rad; 0 is away from the robot. At 45 degrees
+    the arm can look from its left, -1.571."""
 
 
 @dataclass(frozen=True)
@@ -226,7 +231,12 @@ def start_position(config: SimulatedStationConfig) -> list[float]:
     """Joint angles at the start, rad [7]. Raises ValueError where the arm cannot look from there."""
     return list(
         observation_posture(
-            PandaKinematics(config.panda), config.scene.centre_W, config.observe_height, config.start_position
+            PandaKinematics(config.panda),
+            config.scene.centre_W,
+            config.observe_height,
+            config.start_position,
+            config.observe_yaw,
+            config.observe_tilt,
         )
     )
 
