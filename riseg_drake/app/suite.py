@@ -5,12 +5,12 @@ kind "spread". The built-in suites are in `riseg_drake/diagrams/suites`.
 
 out/suite_clutter_seed_100/
     report.md  summary.json      a row a kind
-    1_spread/                    as `riseg evaluate --scenario 1_spread.yaml` leaves it
+    1_spread/                    report.md  figure.png  scene_000/ ... as `riseg evaluate` leaves them
 """
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from importlib.resources import files
@@ -19,7 +19,7 @@ from typing import Any
 
 from rich.console import Console
 
-from riseg_drake.app.evaluate import EvaluationError, evaluate, scene_tasks
+from riseg_drake.app.evaluate import EvaluationError, scene_tasks
 from riseg_drake.app.evaluation_progress import EvaluationProgress
 from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.output import SUMMARY, OutputError, to_json
@@ -29,6 +29,8 @@ from riseg_drake.app.scene_folder import SceneTask, digest, is_finished, read_js
 from riseg_drake.app.scene_pool import Pool, cluster_pool, local_pool
 from riseg_drake.app.scene_work import SceneOutcome
 from riseg_drake.app.tables import score_table
+from riseg_drake.evaluation.figure import draw_figure
+from riseg_drake.evaluation.report import FIGURE_FILE, report_text
 from riseg_drake.evaluation.scene_result import SceneResult
 from riseg_drake.evaluation.step_means import step_means
 from riseg_drake.evaluation.suite_report import KindResult, suite_figures, suite_text
@@ -39,7 +41,7 @@ SCENES = 5
 """Of each kind, where nothing else is asked for."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Kind:
     """One kind of scenes."""
 
@@ -65,7 +67,7 @@ def suite_command(
     """Run what is missing of a suite, then write its table. Raises EvaluationError where every scene failed."""
     kinds = find_suite(suite)
     folder = output or Path("out") / f"suite_{Path(suite).name}_seed_{seed}"
-    tasks = {kind: _tasks(kind, folder, scenes or SCENES, seed) for kind in kinds}
+    tasks = {kind: kind_tasks(kind, folder, scenes or SCENES, seed) for kind in kinds}
     if dask is None:
         require_graphics()
     results = evaluate_suite(tasks, folder, local_pool(jobs) if dask is None else cluster_pool(dask), console)
@@ -121,24 +123,28 @@ def evaluate_suite(
         raise KeyboardInterrupt(
             f"{done} of {len(every)} scenes are finished; the same command goes on from there"
         ) from None
-    results = [_of_kind(kind, group, outcomes) for kind, group in tasks.items()]
-    write_text(folder / REPORT, suite_text(results, _about_text(about, tasks)))
+    settings = _about_text(about, tasks)
+    results = [_of_kind(kind, group, outcomes, settings) for kind, group in tasks.items()]
+    write_text(folder / REPORT, suite_text(results, settings))
     write_text(folder / SUMMARY, to_json({**about, "state": "done", "kinds": suite_figures(results)}))
     return results
 
 
-def _tasks(kind: Kind, folder: Path, scenes: int, seed: int) -> list[SceneTask]:
+def kind_tasks(kind: Kind, folder: Path, scenes: int, seed: int) -> list[SceneTask]:
+    """The scenes of a kind: scene k has the seed `seed + k`; `folder` is the suite's."""
     return scene_tasks(kind.scenario, kind.folder, folder / kind.folder, scenes, seed)
 
 
-def _of_kind(kind: Kind, tasks: Sequence[SceneTask], outcomes: Mapping[Path, SceneOutcome]) -> KindResult:
-    """The scenes of a kind, with the report that they would have alone; nothing is run again."""
-
-    def known(tasks: Sequence[SceneTask]) -> Iterator[SceneOutcome]:
-        return (outcomes[task.folder] for task in tasks)
-
+def _of_kind(
+    kind: Kind, tasks: Sequence[SceneTask], outcomes: Mapping[Path, SceneOutcome], about: Mapping[str, object]
+) -> KindResult:
+    """The scenes of a kind, with a whole report of their own in its folder."""
+    failures = {path: outcome.failure for path, outcome in outcomes.items()}
+    scenes = [read_result(task, failures.get(task.folder, "")) for task in tasks]
     last_step = kind.scenario.arm.most_interactions
-    scenes = evaluate(tasks, known, last_step, Console(quiet=True))
+    folder = tasks[0].folder.parent
+    write_text(folder / REPORT, report_text(scenes, about, last_step))
+    draw_figure(scenes, last_step, folder / FIGURE_FILE)
     return KindResult(kind.name, kind.folder, scenes, last_step)
 
 

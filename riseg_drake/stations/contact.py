@@ -21,7 +21,7 @@ from pydrake.geometry import (
 from pydrake.multibody.plant import ContactModel, DiscreteContactApproximation, MultibodyPlant
 
 MODULUS = 1e6
-"""Hydroelastic modulus, Pa: hard rubber. What stands on a face sinks in by some micrometres."""
+"""Hydroelastic modulus, Pa: soft rubber. What stands on a face sinks in by less than 0.1 mm."""
 RESOLUTION = 0.02
 """m; how finely curved shapes are divided."""
 
