@@ -33,17 +33,22 @@ def feet(loops: Sequence[NDArray], profile: Profile, count: int = 6) -> NDArray:
 
 
 def convex_pieces(
-    loops: Sequence[NDArray], profile: Profile, tolerance: float = 1.0
+    loops: Sequence[NDArray],
+    profile: Profile,
+    tolerance: float = 1.0,
+    lift: float = LIFT,
+    outline: float = 0.25,
 ) -> list[tuple[NDArray, NDArray]]:
     """Convex meshes (vertices [n, 3], faces [m, 3]) that together fill the solid.
 
-    No piece reaches further than `tolerance` beyond the silhouette.
+    No piece reaches further than `tolerance` beyond the silhouette, or lower than `lift`; `outline`
+    is how many pixels its corners may leave out.
     """
     points, distance = _raster(loops)
     pieces = _cut((distance > 0).astype(np.uint8), tolerance / RASTER)
     deepest = float(distance.max())
     top = float(profile.top(np.array(deepest)))
-    levels = [LIFT, profile.foot, profile.shoulder]
+    levels = [lift, profile.foot, profile.shoulder]
     levels += [profile.shoulder + f * (top - profile.shoulder) for f in (0.55, 0.85, 0.99)]
     meshes = []
     for piece in pieces:
@@ -51,11 +56,24 @@ def convex_pieces(
         for z in levels:
             section = points[(piece > 0) & (distance >= profile.inset(z))]
             if len(section) > 8:
-                layers.append(np.column_stack([_outline(section), np.full(len(_outline(section)), z)]))
+                corners = _outline(section, outline)
+                layers.append(np.column_stack([corners, np.full(len(corners), z)]))
         vertices = np.round(np.vstack(layers), 2)
-        hull = ConvexHull(vertices)
-        meshes.append(_oriented(vertices[hull.vertices], vertices, hull))
+        meshes.append(hull_mesh(vertices))
     return meshes
+
+
+def hull_mesh(points: NDArray) -> tuple[NDArray, NDArray]:
+    """The convex hull of points [n, 3]: its own vertices, and its faces, counterclockwise from outside."""
+    hull = ConvexHull(points)
+    number = {int(old): new for new, old in enumerate(hull.vertices)}
+    faces = []
+    for simplex, equation in zip(hull.simplices, hull.equations, strict=True):
+        a, b, c = points[simplex]
+        turn = np.dot(np.cross(b - a, c - a), equation[:3])
+        order = simplex if turn > 0 else simplex[::-1]
+        faces.append([number[int(i)] for i in order])
+    return points[hull.vertices], np.array(sorted(faces))
 
 
 def _raster(loops: Sequence[NDArray]) -> tuple[NDArray, NDArray]:
@@ -101,19 +119,7 @@ def _hull_mask(mask: NDArray) -> NDArray:
     return cv2.fillConvexPoly(np.zeros_like(mask), hull, 1)
 
 
-def _outline(points: NDArray) -> NDArray:
+def _outline(points: NDArray, tolerance: float) -> NDArray:
     """A dozen or so corners of the convex hull of points [n, 2]."""
     hull = cv2.convexHull(points.astype(np.float32))
-    return cv2.approxPolyDP(hull, 0.25, True)[:, 0].astype(float)
-
-
-def _oriented(kept: NDArray, vertices: NDArray, hull: ConvexHull) -> tuple[NDArray, NDArray]:
-    """The hull's own vertices and its faces, renumbered, counterclockwise from outside."""
-    number = {int(old): new for new, old in enumerate(hull.vertices)}
-    faces = []
-    for simplex, equation in zip(hull.simplices, hull.equations, strict=True):
-        a, b, c = vertices[simplex]
-        turn = np.dot(np.cross(b - a, c - a), equation[:3])
-        order = simplex if turn > 0 else simplex[::-1]
-        faces.append([number[int(i)] for i in order])
-    return kept, np.array(sorted(faces))
+    return cv2.approxPolyDP(hull, tolerance, True)[:, 0].astype(float)

@@ -9,13 +9,12 @@ import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from riseg_drake.models.objects.collision import FOOT_RADIUS, convex_pieces, feet
 from riseg_drake.models.objects.outlines import trace
-from riseg_drake.models.objects.patterns import Pattern
 from riseg_drake.models.objects.solids import Mesh, mass_properties, solid
+from riseg_drake.models.objects.texture import painted, plain_obj, write_png
 from riseg_drake.models.objects.toys import TOYS, Toy
 
 TEXTURE_RESOLUTION = 0.36  # mm a texel: half of what a pixel sees from 0.45 m
@@ -41,30 +40,15 @@ def make_toy(toy: Toy, folder: Path) -> None:
     mesh = solid(loops, toy.profile, rng)
     volume, centre, inertia = mass_properties(mesh.vertices, mesh.faces)
     shift = np.array([*centre[:2], 0.0])  # the origin of the body: under its centre of mass, on the table
-    texture, chart = _texture(mesh, toy.pattern, rng)
-    _write_png(folder / f"{toy.name}.png", texture)
+    texture, chart = painted(mesh.chart, toy.pattern, rng, TEXTURE_RESOLUTION)
+    write_png(folder / f"{toy.name}.png", texture)
     (folder / f"{toy.name}.mtl").write_text(_material(toy.name))
     (folder / f"{toy.name}.obj").write_text(_textured_obj(toy.name, mesh, mesh.vertices - shift, chart))
     pieces = convex_pieces(loops, toy.profile)
     for k, (vertices, faces) in enumerate(pieces):
-        (folder / f"{toy.name}_piece_{k}.obj").write_text(_plain_obj(vertices - shift, faces))
+        (folder / f"{toy.name}_piece_{k}.obj").write_text(plain_obj(vertices - shift, faces))
     body = Body(toy.density * volume * MM**3, (centre - shift) * MM, toy.density * inertia * MM**5)
     (folder / f"{toy.name}.sdf").write_text(_sdf(toy, body, feet(loops, toy.profile) - shift, len(pieces)))
-
-
-def _texture(mesh: Mesh, pattern: Pattern, rng: np.random.Generator) -> tuple[NDArray, NDArray]:
-    """The painted image [h, w, 3] (RGB, 8 bit) and the mesh's texture coordinates [n, 2] in 0..1."""
-    low, high = mesh.chart.min(axis=0) - 1.0, mesh.chart.max(axis=0) + 1.0
-    width, height = np.ceil((high - low) / TEXTURE_RESOLUTION).astype(int)
-    x = low[0] + (np.arange(width) + 0.5) * (high[0] - low[0]) / width
-    y = high[1] - (np.arange(height) + 0.5) * (high[1] - low[1]) / height
-    colour = pattern(np.stack(np.meshgrid(x, y), axis=-1), rng)
-    # Six bits a channel: the eye and the camera see no difference, and the file is a third smaller.
-    return (np.round(colour * 63.0) * (255.0 / 63.0)).astype(np.uint8), (mesh.chart - low) / (high - low)
-
-
-def _write_png(path: Path, image: NDArray) -> None:
-    cv2.imwrite(str(path), image[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])
 
 
 def _material(name: str) -> str:
@@ -77,12 +61,6 @@ def _textured_obj(name: str, mesh: Mesh, vertices: NDArray, chart: NDArray) -> s
     lines += [f"vt {u:.4f} {v:.4f}" for u, v in chart]
     lines += [f"vn {x:.3f} {y:.3f} {z:.3f}" for x, y, z in mesh.normals]
     lines += [f"f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}" for a, b, c in mesh.faces + 1]
-    return "\n".join(lines) + "\n"
-
-
-def _plain_obj(vertices: NDArray, faces: NDArray) -> str:
-    lines = [f"v {x:.5f} {y:.5f} {z:.5f}" for x, y, z in vertices * MM]
-    lines += [f"f {a} {b} {c}" for a, b, c in faces + 1]
     return "\n".join(lines) + "\n"
 
 

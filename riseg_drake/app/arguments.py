@@ -50,7 +50,15 @@ def command_line() -> argparse.ArgumentParser:
         "Run many scenes, and put their scores into the paper's table and figure.\n"
         "An evaluation that was stopped goes on where it was when the same command is given again.",
     )
-    evaluate.add_argument("--scenes", type=_positive, default=20, metavar="N", help="how many (20)")
+    evaluate.add_argument(
+        "--suite",
+        metavar="NAME",
+        help="scenes of several kinds, a row each: clutter, or a folder of YAML files, one a kind; or films, of "
+        "still things by a camera that moves and errs",
+    )
+    evaluate.add_argument(
+        "--scenes", type=_positive, metavar="N", help="how many (20); of a suite, of each kind (5)"
+    )
     evaluate.add_argument(
         "--seed",
         type=int,
@@ -64,12 +72,6 @@ def command_line() -> argparse.ArgumentParser:
         "--output", type=Path, metavar="DIR", help="output folder (out/evaluate_SCENARIO_seed_S)"
     )
     _add_overwrite(evaluate, "evaluation")
-    evaluate.add_argument(
-        "--suite",
-        choices=("films",),
-        metavar="NAME",
-        help="films: instead of scenes, ten films of things that stand still, by a camera that moves and errs",
-    )
     evaluate.add_argument(
         "--recordings", type=Path, metavar="DIR", help="with --suite films: also segment the recordings in DIR"
     )

@@ -79,7 +79,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.stations.lcm_channels import LcmError
     from riseg_drake.stations.lcm_images import ImageError
     from riseg_drake.stations.misbehaviour import WordError
-    from riseg_drake.stations.scene import SceneError
+    from riseg_drake.stations.object_models import SceneError
 
     return (
         OSError,

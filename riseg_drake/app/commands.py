@@ -24,10 +24,16 @@ def evaluate(chosen: argparse.Namespace, console: Console) -> None:
         from riseg_drake.app.films import films_command
 
         return films_command(chosen.seed, chosen.recordings, chosen.output, chosen.scenario, console)
+    if chosen.suite is not None:
+        from riseg_drake.app.suite import suite_command
+
+        return suite_command(
+            chosen.suite, chosen.scenes, chosen.seed, chosen.jobs, chosen.output, chosen.dask, console
+        )
     from riseg_drake.app.evaluate import evaluate_command
 
     evaluate_command(
-        chosen.scenes,
+        chosen.scenes or 20,
         chosen.seed,
         chosen.objects,
         chosen.jobs,

@@ -58,8 +58,9 @@ def evaluate_command(
     """
     scenario = load_scenario(scenario_file)
     if objects is not None:
-        scenario.simulated.scene.objects = str(objects.resolve())
-    find_models(scenario.simulated.scene.objects, scenario.simulated.scene.names)  # says it if there are none
+        scenario.simulated.scene.objects = [str(objects.resolve())]
+    if not scenario.simulated.scene.placed:  # says it if there are none
+        find_models(scenario.simulated.scene.objects, scenario.simulated.scene.names)
     name = scenario_name(scenario_file)
     if baseline == "sam":
         _require_sam(scenario)

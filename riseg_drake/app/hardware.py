@@ -178,7 +178,9 @@ def _what_is_missing(reception: Reception, config: HardwareStationConfig, ready:
         return "no picture came that can be used"
     sent, message = newest
     try:
-        as_drake_images(decode_images(message), config.camera)
+        as_drake_images(
+            decode_images(message, (config.camera.full_width, config.camera.full_height)), config.camera
+        )
     except ImageError as error:
         reception.skip(sent, error)
         return "no picture came that can be used"

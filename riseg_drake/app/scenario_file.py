@@ -61,7 +61,7 @@ def parse_scenario(text: str, schema: type[Schema], source: str) -> Schema:
         return schema()
     _check(node, schema, name="the scenario", source=source)
     try:
-        loaded = yaml_load_typed(schema=schema, data=text, defaults=schema())
+        loaded = yaml_load_typed(schema=schema, data=yaml.serialize(node), defaults=schema())
     except Exception as error:  # the loader's, YAML's own, and those of whatever a tag or a number asks for
         raise ScenarioError(f"{source}: {one_line(error)}") from None
     for complaint in _complaints(loaded):
@@ -152,7 +152,7 @@ def _check_keys(node: yaml.Node, schema: Any, name: str, source: str, where: str
     known = [field.name for field in dataclasses.fields(schema)]
     if not isinstance(node, yaml.MappingNode):
         raise ScenarioError(f"{where} {name} must be a block of keys ({', '.join(known)}), not {_said(node)}")
-    for key_node, value_node in node.value:
+    for index, (key_node, value_node) in enumerate(node.value):
         key = key_node.value
         path = key if name == "the scenario" else f"{name}.{key}"
         if key not in known:
@@ -160,6 +160,11 @@ def _check_keys(node: yaml.Node, schema: Any, name: str, source: str, where: str
             right = f"did you mean {near[0]!r}?" if near else f"the keys here are {', '.join(known)}"
             line = key_node.start_mark.line + 1
             raise ScenarioError(f"{source}: line {line}: unknown key {path!r}; {right}")
+        if fields[key] == list[str] and isinstance(value_node, yaml.ScalarNode) and _FITS[str](value_node):
+            # One text stands for a list of one.
+            marks = value_node.start_mark, value_node.end_mark
+            value_node = yaml.SequenceNode("tag:yaml.org,2002:seq", [value_node], *marks)
+            node.value[index] = (key_node, value_node)
         _check(value_node, fields[key], path, source)
         choices = _choices(schema, key)
         if choices and value_node.value not in choices:

@@ -55,7 +55,7 @@ def report_text(scenes: Sequence[SceneResult], about: Mapping[str, object], last
 
 def score_cells(scores: Scores) -> list[str]:
     """The seven figures of the paper's table, in percent."""
-    return [_percent(share) for share in table_figures(scores)]
+    return [percent(share) for share in table_figures(scores)]
 
 
 def table_figures(scores: Scores) -> tuple[float, ...]:
@@ -83,7 +83,7 @@ def _score_section(scenes: Sequence[SceneResult], last_step: int) -> str:
         f"{sum(scene.interactions >= i for scene in scenes)} reached {i}" for i in range(1, last_step + 1)
     )
     return (
-        _table(("method", "step i", *_HEAD), rows)
+        markdown_table(("method", "step i", *_HEAD), rows)
         + f"""
 In percent. Step i is after i interactions; *found* is the share of objects with Overlap F above
 {FOUND_ABOVE_F:.0%}. Each figure is the unweighted mean over the {len(scenes)} scenes, so the mean F is not
@@ -103,10 +103,10 @@ def _in_motion_section(scenes: Sequence[SceneResult], last_step: int) -> str:
     for name, (number, mean) in zip(names, figures, strict=True):
         cells = ["0", "–", "–"] if mean is None else []
         if mean is not None:
-            cells = [str(mean.frames), _percent(mean.overlap_f), _percent(mean.at_rest_f)]
+            cells = [str(mean.frames), percent(mean.overlap_f), percent(mean.at_rest_f)]
         rows.append([name, str(number), *cells])
     return (
-        _table(("interaction", "scenes", "frames", "Overlap F in motion", "at rest after it"), rows)
+        markdown_table(("interaction", "scenes", "frames", "Overlap F in motion", "at rest after it"), rows)
         + f"""
 Overlap F of the objects that the interaction has moved by {100 * MOVED:g} cm or more so far, in every
 frame from then on until the camera observes again, and the same objects' in the last frame at rest. Means
@@ -128,7 +128,7 @@ def _ending_section(scenes: Sequence[SceneResult]) -> str:
         mean, most = (np.mean(known), max(known)) if known else (float("nan"), float("nan"))
         rows.append([ended, str(number), _number(float(mean), 1), _number(float(most), 1)])
     return (
-        _table(("reason", "scenes", "left, mean cm^2", "most"), rows)
+        markdown_table(("reason", "scenes", "left, mean cm^2", "most"), rows)
         + """
 *left* is what stands on the table and is yet to be segmented, as the push planner sees it.
 """
@@ -152,7 +152,7 @@ def _disturbance_section(scenes: Sequence[SceneResult], last_step: int) -> str:
         "left the table",
     )
     return (
-        _table(head, rows)
+        markdown_table(head, rows)
         + f"""
 The pushed object is the one that the push was planned to meet. Tilt is against the start of the run; more
 than {TOPPLED_DEG:g} degrees count as toppled, also where a ball has merely rolled.
@@ -179,18 +179,18 @@ def _scene_section(scenes: Sequence[SceneResult], last_step: int) -> str:
         picture = f"[{scene.name}]({scene.name}/step_{scene.interactions}/overlay.png)"
         found = "–" if isnan(last.objects_true) else f"{last.objects_found:g} of {last.objects_true:g}"
         moved = pooled(scene.in_motion)
-        figures = [_percent(last.overlap_f), _percent(last.boundary_f), found]
+        figures = [percent(last.overlap_f), percent(last.boundary_f), found]
         rows.append(
             [
                 picture if scene.scores else scene.name,
                 str(scene.seed),
                 str(scene.interactions),
                 *figures,
-                "–" if moved is None else _percent(moved.overlap_f),
+                "–" if moved is None else percent(moved.overlap_f),
                 scene.failure or scene.end,
             ]
         )
-    return _table(
+    return markdown_table(
         ("scene", "seed", "interactions", "Overlap F", "Boundary F", "found", "F in motion", "end"), rows
     )
 
@@ -211,7 +211,7 @@ def _ablation_section(scenes: Sequence[SceneResult], last_step: int) -> str:
         mean = step_means(scores, last_step)[-1]
         rows.append([switch, *score_cells(mean), _difference(scores, ours, last_step)])
     return (
-        _table(("version", *_HEAD, "Overlap F against ours"), rows)
+        markdown_table(("version", *_HEAD, "Overlap F against ours"), rows)
         + """
 After the last interaction, in percent, means over the same scenes. The runs were made once, by this
 project's version, which chose the pushes; each row segments the recorded frames again with one switch as
@@ -239,7 +239,8 @@ def _difference(scores: Sequence[Sequence[Scores]], ours: Sequence[Sequence[Scor
     return f"{difference.mean():+.1f} ± {difference.std(ddof=1) / np.sqrt(len(difference)):.1f}"
 
 
-def _table(head: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
+def markdown_table(head: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table in Markdown, its figures to the right."""
     head = list(head)
     lines = [
         head,
@@ -253,7 +254,8 @@ def _strong(text: str, strong: bool) -> str:
     return f"**{text}**" if strong else text
 
 
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
+    """A share in percent, or a dash for what is unknown."""
     return _number(100 * share, 1)
 
 

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder
 
 from riseg_drake.geometry.camera import pixel_grid
-from riseg_drake.stations.scene import object_id_table
+from riseg_drake.stations.placed_object import object_id_table
 from riseg_drake.stations.simulated import RENDERER, SimulatedStationConfig, add_world, ideal_camera
 from riseg_drake.stations.wrist_camera import CameraConfig, measured_images
 

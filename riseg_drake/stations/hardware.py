@@ -217,7 +217,7 @@ def newest_sight(reception: Reception, config: HardwareCameraConfig, after: floa
         return None
     sent, message = newest
     try:
-        images = decode_images(message)
+        images = decode_images(message, (config.full_width, config.full_height))
         taken = sent + (images.time - message.header.utime * 1e-6)
         if not sent - LONGEST_EXPOSURE <= taken <= sent + AHEAD:
             raise ImageError(

@@ -12,7 +12,7 @@ from riseg_drake.robot.position_history import PositionHistory
 from riseg_drake.stations.arm_messages import AHEAD, BEHIND, PictureDoor, StatusDoor
 from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.lcm_channels import LcmConfig
-from riseg_drake.stations.lcm_images import ImageError
+from riseg_drake.stations.lcm_images import ImageError, decode_message
 
 POLL = 0.01
 """Time between two looks for messages, s. Waiting inside LCM would keep Python's lock, and looking more often
@@ -113,9 +113,9 @@ class Reception:
             if sent <= after:
                 break
             try:
-                return sent, lcmt_image_array.decode(data)
-            except Exception as error:  # whatever the decoder makes of it
-                self.skip(sent, ImageError(f"a picture message that is cut off or damaged ({error})"))
+                return sent, decode_message(data)
+            except ImageError as error:
+                self.skip(sent, error)
         return None
 
     def skip(self, sent: float, error: ImageError) -> None:

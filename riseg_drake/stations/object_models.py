@@ -5,23 +5,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import SceneGraph, Sphere
+from pydrake.geometry import Convex, Mesh, SceneGraph, Shape
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import PackageMap, Parser
-from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
-from scipy.spatial import ConvexHull
 
 from riseg_drake.host.model_files import ModelFileError, check_model
 from riseg_drake.host.terminal import one_line
+from riseg_drake.stations.contact import touches_over_area
 from riseg_drake.stations.footprint import Footprint, footprint, shape_corners
-
-FOOT_RADIUS = 0.002
-FOOT_REACH = 0.0003
-"""How far a foot stands out below a flat underside, m: beyond what its contact is pressed in."""
 
 
 class SceneError(ValueError):
@@ -38,33 +35,50 @@ class ObjectModel:
     """The body's pose as modelled."""
     footprint: Footprint
     """Of the body in its modelled pose, about its origin."""
-    feet: NDArray
-    """Centres p_BF [k, 3] of balls to be added below a flat underside; none where it needs none."""
-    foot_friction: CoulombFriction
-    """Of those balls: that of the geometry they stand for."""
+    corners: NDArray
+    """Points p_BP [n, 3], m, whose convex hull holds the body's collision geometry."""
+    over_areas: bool
+    """Whether it touches others over areas, or only at points."""
 
 
-def find_models(folder_or_url: str, names: Sequence[str] = ()) -> list[ObjectModel]:
-    """The models of a folder (`*.sdf`, `*.urdf`, there or one folder down), sorted by name, measured.
+def find_models(folders: str | Sequence[str], names: Sequence[str] = ()) -> list[ObjectModel]:
+    """The models of one folder or several (`*.sdf`, `*.urdf`, there or one folder down), by name, measured.
 
-    A `package://` URL may be given for the folder. `names` selects some of them. Raises SceneError.
+    `package://` URLs may be given for folders. `names` selects some of the models. Raises SceneError.
     """
-    folder = _resolve(folder_or_url)
-    found = [path for end in ("sdf", "urdf") for deep in ("", "*/") for path in folder.glob(f"{deep}*.{end}")]
-    if not found:
-        raise SceneError(
-            f"objects: no models in {folder}; expected *.sdf or *.urdf files, there or one folder down"
-        )
     paths: dict[str, Path] = {}
-    for path in sorted(found):
-        name = path.parent.name if path.stem == "model" else path.stem
-        if name in paths:
-            raise SceneError(f"objects: {path} and {paths[name]} are both called {name}; rename one")
-        paths[name] = path
+    for folder in map(_resolve, [folders] if isinstance(folders, str) else folders):
+        found = [
+            path for end in ("sdf", "urdf") for deep in ("", "*/") for path in folder.glob(f"{deep}*.{end}")
+        ]
+        if not found:
+            raise SceneError(
+                f"objects: no models in {folder}; expected *.sdf or *.urdf files, there or one folder down"
+            )
+        for path in sorted(found):
+            name = path.parent.name if path.stem == "model" else path.stem
+            if name in paths:
+                raise SceneError(f"objects: {path} and {paths[name]} are both called {name}; rename one")
+            paths[name] = path
+    if not paths:
+        raise SceneError("objects: no folder; expected one or more with *.sdf or *.urdf models")
     unknown = sorted(set(names) - set(paths))
     if unknown:
         raise SceneError(f"names: no model {', '.join(unknown)}; there are {', '.join(sorted(paths))}")
     return [measure(name, paths[name]) for name in sorted(names or paths)]
+
+
+def find_model(path_or_url: str) -> ObjectModel:
+    """The model of one file, or of a folder that holds one model; measured. Raises SceneError."""
+    path = resolve(path_or_url)
+    if path.is_dir():
+        found = sorted([*path.glob("*.sdf"), *path.glob("*.urdf")])
+        if len(found) != 1:
+            raise SceneError(f"model: {len(found)} models in {path}; expected one *.sdf or *.urdf, or a file")
+        (path,) = found
+    if not path.is_file():
+        raise SceneError(f"model: no file {path}; expected an SDF or URDF model")
+    return measure(path.parent.name if path.stem == "model" else path.stem, path)
 
 
 def parse_body(plant: MultibodyPlant, path: Path) -> RigidBody:
@@ -95,67 +109,61 @@ def measure(name: str, path: Path) -> ObjectModel:
         raise SceneError(f"{path} cannot be read: {one_line(error)}") from error
     if not body.is_floating_base_body():
         raise SceneError(f"{path} is fixed to the world; an object of a scene must be free to move")
-    if not body.default_mass() > 0:
-        raise SceneError(f"{path} has mass {body.default_mass():g}; an object needs a positive mass in kg")
+    mass = min([body.default_mass(), *_masses_said(path)])
+    if not mass > 0:
+        raise SceneError(f"{path} has mass {mass:g}; an object needs a positive mass in kg")
     geometries = plant.GetCollisionGeometriesForBody(body)
     if not geometries:
         raise SceneError(f"{path} has no collision geometry; without it nothing can push the object")
     inspector = scene_graph.model_inspector()
+    if not any(_is_drawn(inspector.GetShape(g)) for g in plant.GetVisualGeometriesForBody(body)):
+        raise SceneError(
+            f"{path} has nothing to see; an object needs a <visual>, a box, a cylinder or the like, or an OBJ, "
+            "glTF or VTK mesh"
+        )
     R_WB = plant.GetDefaultFloatingBaseBodyPose(body).rotation()
     X_WB = RigidTransform(R_WB)
     try:
         outline = footprint(inspector, geometries, X_WB)
-        lowest = [
-            X_WB.multiply(inspector.GetPoseInFrame(g).multiply(shape_corners(inspector.GetShape(g)).T)).T
-            for g in geometries
-            if not isinstance(inspector.GetShape(g), Sphere)
+        corners = [
+            inspector.GetPoseInFrame(g).multiply(shape_corners(inspector.GetShape(g)).T).T for g in geometries
         ]
     except ValueError as error:
         raise SceneError(f"{path}: {error}") from error
-    feet = _feet(np.vstack(lowest), outline.bottom) if lowest else np.zeros((0, 3))
-    p_BF = R_WB.inverse().multiply(feet.T).T if len(feet) else feet
-    if len(feet):
-        outline = Footprint(outline.pieces, float(feet[:, 2].min()) - FOOT_RADIUS)
-    surface = inspector.GetProximityProperties(geometries[0]).GetProperty("material", "coulomb_friction")
-    # A copy: what the inspector hands out dies with the scene graph.
-    friction = CoulombFriction(surface.static_friction(), surface.dynamic_friction())
-    return ObjectModel(name, path, X_WB, outline, p_BF, friction)
+    over_areas = any(touches_over_area(inspector, geometry) for geometry in geometries)
+    return ObjectModel(name, path, X_WB, outline, np.vstack(corners), over_areas)
 
 
-def _feet(corners: NDArray, bottom: float) -> NDArray:
-    """Ball centres [k, 3] below a flat underside, or none where the underside is not flat.
-
-    Point contact gives a flat face one point to stand on, and two boxes in contact sink into each other;
-    four balls at the face's corners stand still and slide as the face would.
-    """
-    face = corners[corners[:, 2] < bottom + 0.5 * FOOT_REACH][:, :2]
-    if len(face) < 3 or np.linalg.matrix_rank(face - face.mean(axis=0), tol=FOOT_RADIUS) < 2:
-        return np.zeros((0, 3))
-    face = face[ConvexHull(face).vertices]
-    centre = face.mean(axis=0)
-    chosen = [int(np.argmax(np.linalg.norm(face - centre, axis=1)))]
-    for _ in range(min(4, len(face)) - 1):
-        spread = np.linalg.norm(face[:, None] - face[chosen], axis=-1).min(axis=1)
-        chosen.append(int(np.argmax(spread)))
-    arm = face[chosen] - centre
-    length = np.linalg.norm(arm, axis=1, keepdims=True)
-    inset = centre + arm * np.maximum(1.0 - 1.5 * FOOT_RADIUS / length, 0.5)
-    return np.column_stack([inset, np.full(len(inset), bottom - FOOT_REACH + FOOT_RADIUS)])
+def resolve(path_or_url: str) -> Path:
+    """The path that a text names: as it stands, or of a `package://` URL. Raises SceneError."""
+    if not path_or_url.startswith("package://"):
+        try:
+            return Path(path_or_url).expanduser()
+        except RuntimeError as error:  # nobody knows where ~ is
+            raise SceneError(f"objects: {path_or_url}: {error}") from None
+    packages = PackageMap()
+    packages.Add("riseg_drake_models", Path(str(files("riseg_drake.models"))))
+    try:
+        return Path(packages.ResolveUrl(path_or_url))
+    except RuntimeError as error:
+        raise SceneError(f"objects: {' '.join(str(error).split())}") from error
 
 
 def _resolve(folder_or_url: str) -> Path:
-    if not folder_or_url.startswith("package://"):
-        try:
-            folder = Path(folder_or_url).expanduser()
-        except RuntimeError as error:  # nobody knows where ~ is
-            raise SceneError(f"objects: {folder_or_url}: {error}") from None
-    else:
-        packages = PackageMap()
-        packages.Add("riseg_drake_models", Path(str(files("riseg_drake.models"))))
-        try:
-            folder = Path(packages.ResolveUrl(folder_or_url))
-        except RuntimeError as error:
-            raise SceneError(f"objects: {' '.join(str(error).split())}") from error
+    folder = resolve(folder_or_url)
     if not os.path.isdir(folder):
         raise SceneError(f"objects: {folder} is not a folder; expected one with *.sdf or *.urdf models")
     return folder
+
+
+def _masses_said(path: Path) -> list[float]:
+    """The masses, kg, in an SDF file: Drake's parser makes 1 kg of what is no mass."""
+    if path.suffix != ".sdf":
+        return []
+    said = [element.text or "" for element in ElementTree.parse(path).iter("mass")]
+    return [float(text) for text in said if text.strip()]
+
+
+def _is_drawn(shape: Shape) -> bool:
+    """Whether the camera's renderer draws a shape."""
+    return not isinstance(shape, Mesh | Convex) or shape.extension().lower() in (".obj", ".gltf", ".vtk")

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 from pydrake.geometry import (
@@ -24,12 +23,7 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import (
-    AddMultibodyPlantSceneGraph,
-    ContactModel,
-    DiscreteContactApproximation,
-    MultibodyPlant,
-)
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, Frame, ModelInstanceIndex, PdControllerGains
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import Demultiplexer, StateInterpolatorWithDiscreteDerivative
@@ -45,13 +39,10 @@ from riseg_drake.robot.description import (
 )
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture
 from riseg_drake.robot.limits import check_start_position
-from riseg_drake.stations.scene import (
-    PlacedObject,
-    SceneConfig,
-    add_scene,
-    draw_scene,
-    object_id_table,
-)
+from riseg_drake.stations.contact import let_touch, set_contact_model
+from riseg_drake.stations.object_models import resolve
+from riseg_drake.stations.placed_object import PlacedObject, add_scene, object_id_table
+from riseg_drake.stations.scene import SceneConfig, make_scene
 from riseg_drake.stations.wrist_camera import CameraConfig, ObjectLabels, WristCamera
 
 RENDERER = "renderer"
@@ -78,7 +69,7 @@ class TableConfig:
     color: list[float] = field(default_factory=list)
     """Red, green, blue of the top, 0 to 1; empty: as the model says (white)."""
     texture: str = ""
-    """A PNG or JPEG file laid over the top; empty: none."""
+    """A PNG or JPEG file, or a `package://` URL of one, laid over the top; empty: none."""
 
 
 @dataclass
@@ -137,16 +128,17 @@ def add_world(
     `objects` replaces the scene that `config.scene` would draw from the seed. Raises ValueError.
     """
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, step)
-    # With these two, pushes of 2 cm end within a millimetre and things lie still (at 1 to 2 ms).
-    plant.set_contact_model(ContactModel.kPoint)
-    plant.set_discrete_contact_approximation(DiscreteContactApproximation.kLagged)
     panda = add_panda(plant, config.panda)
+    for body in plant.GetBodyIndices(panda.pusher):
+        pushing = plant.GetCollisionGeometriesForBody(plant.get_body(body))
+        let_touch(plant, scene_graph, pushing, rigid=True)
     for instance in (panda.arm, panda.pusher):
         plant.set_gravity_enabled(instance, False)
     _add_table(plant, scene_graph, config.table)
     if objects is None:
-        objects = draw_scene(config.scene, np.random.default_rng(seed))
-    object_bodies = add_scene(plant, objects)
+        objects = make_scene(config.scene, np.random.default_rng(seed))
+    object_bodies = add_scene(plant, scene_graph, objects)
+    set_contact_model(plant, any(item.model.over_areas for item in objects))
     _set_gains(plant, panda.arm, config)
     plant.Finalize()
     plant.SetDefaultPositions(panda.arm, start_position(config))
@@ -274,9 +266,11 @@ def _add_table(plant: MultibodyPlant, scene_graph: SceneGraph, config: TableConf
     (body_index,) = plant.GetBodyIndices(table)
     body = plant.get_body(body_index)
     plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform([*config.centre_W, 0.0]))
+    let_touch(plant, scene_graph, plant.GetCollisionGeometriesForBody(body), rigid=True)
     if not config.color and not config.texture:
         return
-    if config.texture and not Path(config.texture).is_file():
+    texture = resolve(config.texture) if config.texture else None
+    if texture is not None and not texture.is_file():
         raise ValueError(f"table texture: no file {config.texture}; expected a PNG or JPEG image")
     source = plant.get_source_id()
     for geometry in plant.GetVisualGeometriesForBody(body):
@@ -289,6 +283,6 @@ def _add_table(plant: MultibodyPlant, scene_graph: SceneGraph, config: TableConf
             scene_graph.RemoveRole(source, geometry, role)
         # Meshcat draws no texture on a box: it shows the colour alone.
         scene_graph.AssignRole(source, geometry, IllustrationProperties(looks))
-        if config.texture:
-            looks.AddProperty("phong", "diffuse_map", config.texture)
+        if texture is not None:
+            looks.AddProperty("phong", "diffuse_map", str(texture))
         scene_graph.AssignRole(source, geometry, looks)

@@ -13,20 +13,15 @@ from pydrake.geometry import (
     RenderEngineVtkParams,
 )
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
 
 from riseg_drake.stations.footprint import Footprint, separation, travel
-from riseg_drake.stations.object_models import find_models
-from riseg_drake.stations.scene import (
-    PlacedObject,
-    SceneConfig,
-    SceneError,
-    add_scene,
-    draw_scene,
-    object_id_table,
-)
+from riseg_drake.stations.object_models import SceneError, find_model, find_models
+from riseg_drake.stations.placed_object import PlacedObject, add_scene, object_id_table
+from riseg_drake.stations.scene import PlacedConfig, SceneConfig, draw_scene, make_scene
+from riseg_drake.stations.settling import SettlingTable, is_pile, settle
 
 SEEDS = range(6)
 INERTIAL = (
@@ -34,11 +29,14 @@ INERTIAL = (
 )
 
 
-def sdf(geometry: str, pose: str = "0 0 0 0 0 0", more: str = "") -> str:
+def sdf(
+    geometry: str, pose: str = "0 0 0 0 0 0", more: str = "", visual: str = "", inertial: str = INERTIAL
+) -> str:
     collision = f'<collision name="c"><geometry>{geometry}</geometry></collision>' if geometry else ""
+    seen = visual or f'<visual name="v"><geometry>{box(0.01, 0.01, 0.01)}</geometry></visual>'
     return (
         f'<sdf version="1.9"><model name="m"><pose>{pose}</pose>'
-        f'<link name="b">{INERTIAL}{collision}</link>{more}</model></sdf>'
+        f'<link name="b">{inertial}{collision}{seen}</link>{more}</model></sdf>'
     )
 
 
@@ -57,7 +55,8 @@ def write_plain_models(folder: Path) -> None:
     (folder / "dice.urdf").write_text(
         '<robot name="dice"><link name="d"><inertial><mass value="0.1"/>'
         '<inertia ixx="6e-5" iyy="6e-5" izz="7e-5" ixy="0" ixz="0" iyz="0"/></inertial>'
-        '<collision><geometry><box size="0.05 0.05 0.05"/></geometry></collision></link></robot>'
+        '<collision><geometry><box size="0.05 0.05 0.05"/></geometry></collision>'
+        '<visual><geometry><box size="0.05 0.05 0.05"/></geometry></visual></link></robot>'
     )
 
 
@@ -154,14 +153,13 @@ def test_a_folder_of_plain_models_makes_a_scene(tmp_path):
         "can": 0.025,
         "dice": 0.025,
     }.items():
-        # On its added feet a box stands 0.3 mm high; without them it sinks into the table.
-        assert height[name] == pytest.approx(half, abs=5e-4)
+        assert height[name] == pytest.approx(half, abs=1e-4)
 
 
 def test_object_ids_count_the_bodies_in_the_order_of_the_scene():
     scene = draw(0, names=["fish", "pizza", "starfish"], count_min=3, count_max=3)
-    plant = MultibodyPlant(0.002)
-    bodies = add_scene(plant, scene)
+    plant, scene_graph = AddMultibodyPlantSceneGraph(DiagramBuilder(), 0.002)
+    bodies = add_scene(plant, scene_graph, scene)
     plant.Finalize()
     context = plant.CreateDefaultContext()
     assert list(bodies) == [1, 2, 3]
@@ -178,7 +176,7 @@ def test_every_object_shows_in_the_label_image_of_a_camera_half_a_metre_up(scene
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.002)
     scene_graph.AddRenderer("vtk", MakeRenderEngineVtk(RenderEngineVtkParams()))
-    bodies = add_scene(plant, scenes[0])
+    bodies = add_scene(plant, scene_graph, scenes[0])
     plant.Finalize()
     core = RenderCameraCore(
         "vtk",
@@ -232,6 +230,8 @@ def test_an_impossible_scene_says_in_one_line_what_is_wrong(options, message):
         (sdf(""), "no collision geometry"),
         (sdf(box(0.05, 0.05, 0.05), more="<static>true</static>"), "fixed to the world"),
         (sdf("<plane><normal>0 0 1</normal></plane>"), "half space"),
+        (sdf(box(0.05, 0.05, 0.05), visual="<!-- none -->"), "nothing to see"),
+        (sdf(box(0.05, 0.05, 0.05), inertial="<inertial><mass>0</mass></inertial>"), "mass 0"),
         ("<sdf version='1.9'><model", "cannot be read"),
     ],
 )
@@ -250,3 +250,115 @@ def test_a_model_that_falls_over_is_named(tmp_path):
     (tmp_path / "tower.sdf").write_text(tower)
     with pytest.raises(SceneError, match="tower does not stay where it is put"):
         draw(0, objects=str(tmp_path), count_min=1, count_max=1)
+
+
+HOUSEHOLD = ["package://riseg_drake_models/household"]
+CARTONS = [f"carton_{name}" for name in ("tea", "oats", "soap", "rice", "biscuits", "muesli", "filters")]
+
+
+def test_objects_come_from_several_folders(tmp_path):
+    write_plain_models(tmp_path)
+    models = find_models([str(tmp_path), *HOUSEHOLD], ["brick", "box_white"])
+    assert [model.name for model in models] == ["box_white", "brick"]
+
+
+def test_placed_objects_stand_exactly_where_the_scenario_says(tmp_path):
+    write_plain_models(tmp_path)
+    placed = [
+        PlacedConfig(str(tmp_path / "brick.sdf"), [0.5, 0.1, 0.02, 0.0, 0.0, 0.5]),
+        PlacedConfig(str(tmp_path / "can"), [0.4, -0.1, 0.025, 0.1, 0.2, 0.3]),
+    ]
+    scene = make_scene(SceneConfig(placed=placed), np.random.default_rng(0))
+    assert [item.name for item in scene] == ["brick", "can"]
+    np.testing.assert_array_equal(scene[1].X_WB.translation(), [0.4, -0.1, 0.025])
+    # Roll, pitch, yaw are turns about W's x, y, z, one after the other.
+    R = (
+        RotationMatrix.MakeZRotation(0.3)
+        @ RotationMatrix.MakeYRotation(0.2)
+        @ RotationMatrix.MakeXRotation(0.1)
+    )
+    np.testing.assert_allclose(scene[1].X_WB.rotation().matrix(), R.matrix(), atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("placed", "message"),
+    [
+        (PlacedConfig("no/such.sdf"), "no file no/such.sdf"),
+        (PlacedConfig(HOUSEHOLD[0]), "0 models in"),
+        (PlacedConfig(f"{HOUSEHOLD[0]}/box_white", [0.5, 0.0]), "2 numbers; expected x, y, z"),
+    ],
+)
+def test_a_placed_object_that_cannot_be_says_why(placed, message):
+    with pytest.raises(SceneError, match=message) as error:
+        make_scene(SceneConfig(placed=[placed]), np.random.default_rng(0))
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize("seed", range(3))
+def test_packed_cartons_have_a_neighbour_within_a_millimetre_and_stay(seed):
+    scene = draw(seed, layout="packed", objects=HOUSEHOLD, names=CARTONS)
+    for k, item in enumerate(scene):
+        others = [separation(lying(item), lying(other)) for j, other in enumerate(scene) if j != k]
+        assert 0 < min(others) <= 1e-3
+        sides = [
+            np.arctan2(edge[1], edge[0])
+            for piece in lying(item).pieces
+            for edge in np.roll(piece, -1, 0) - piece
+        ]
+        first = lying(scene[0]).pieces[0]
+        along = np.arctan2(*(first[1] - first[0])[::-1])
+        assert np.allclose(np.sin(2 * (np.array(sides) - along)), 0.0, atol=1e-3), "their sides are parallel"
+    for before, after in zip(scene, settle(scene, (0.5, 0.0)), strict=True):
+        assert np.linalg.norm(before.X_WB.translation() - after.X_WB.translation()) < 1e-4
+
+
+def test_faces_laid_together_are_not_driven_apart(tmp_path):
+    for name, (x, y, z) in {"low": (0.09, 0.05, 0.03), "high": (0.06, 0.05, 0.08)}.items():
+        (tmp_path / f"{name}.sdf").write_text(sdf(box(x, y, z)))
+    low, high = find_model(str(tmp_path / "low.sdf")), find_model(str(tmp_path / "high.sdf"))
+    placed = [
+        PlacedObject(low, RigidTransform([0.5, 0.0, 0.015])),
+        PlacedObject(high, RigidTransform([0.5, 0.05, 0.04])),  # flush: no gap at all
+        PlacedObject(low, RigidTransform([0.5, 0.10, 0.015])),
+    ]
+    for before, after in zip(placed, settle(placed, (0.5, 0.0)), strict=True):
+        assert np.linalg.norm(after.X_WB.translation() - before.X_WB.translation()) < 1e-4
+        np.testing.assert_allclose(after.X_WB.rotation().matrix(), before.X_WB.rotation().matrix(), atol=2e-3)
+
+
+def test_a_tower_of_boxes_is_at_rest_and_known_as_a_pile(tmp_path):
+    (tmp_path / "slab.sdf").write_text(sdf(box(0.08, 0.06, 0.02)))
+    slab = find_model(str(tmp_path / "slab.sdf"))
+    tower = [PlacedObject(slab, RigidTransform([0.5 + 0.01 * k, 0.0, 0.01 + 0.02 * k])) for k in range(3)]
+    table = SettlingTable(tower, (0.5, 0.0))
+    assert table.settle(2.0)
+    assert table.touching() == {frozenset(pair) for pair in ((0, 1), (1, 2), (2, 3))}
+    for before, after in zip(tower, table.objects(), strict=True):
+        shift = after.X_WB.translation() - before.X_WB.translation()
+        assert np.linalg.norm(shift[:2]) < 1e-4
+        assert -3e-4 < shift[2] < 0  # pressed in by its own weight, three deep
+
+
+def test_a_pile_has_half_of_its_objects_against_others_and_one_carried():
+    table = [frozenset((0, k)) for k in (1, 2, 3, 4)]
+    assert is_pile({frozenset((0, 1)), frozenset((1, 2))}, 2)
+    assert not is_pile({*table[:2], frozenset((1, 2))}, 2), "side by side"
+    assert not is_pile({*table, frozenset((4, 5))}, 5), "two of five"
+    assert not is_pile(set(table), 4)
+
+
+@pytest.mark.renders
+def test_a_drawn_pile_is_at_rest_inside_the_work_area_and_the_same_again():
+    options = {"objects": HOUSEHOLD, "names": [*CARTONS, "box_white", "can_tuna"], "layout": "pile"}
+    scene, again = (draw(2, **options, count_max=5) for _ in range(2))
+    assert [item.name for item in scene] == [item.name for item in again]
+    for item, other in zip(scene, again, strict=True):
+        np.testing.assert_array_equal(item.X_WB.GetAsMatrix4(), other.X_WB.GetAsMatrix4())
+        corners = item.X_WB.multiply(item.model.corners.T).T
+        assert np.linalg.norm(corners[:, :2] - (0.5, 0.0), axis=1).max() < 0.2
+    table = SettlingTable(scene, (0.5, 0.0))
+    table.settle(0.4)
+    assert is_pile(table.touching(), len(scene))
+    for before, after in zip(scene, table.objects(), strict=True):
+        assert np.linalg.norm(after.X_WB.translation() - before.X_WB.translation()) < 5e-4

@@ -9,7 +9,7 @@ from riseg_drake.geometry.se3 import exp_se3
 from riseg_drake.robot.kinematics import PandaKinematics, tip_pointing_down
 from riseg_drake.stations.contract import check_contract
 from riseg_drake.stations.object_models import measure
-from riseg_drake.stations.scene import PlacedObject
+from riseg_drake.stations.placed_object import PlacedObject
 from riseg_drake.stations.simulated import SimulatedStation, SimulatedStationConfig, start_position
 
 pytestmark = pytest.mark.renders

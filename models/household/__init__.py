@@ -1,0 +1,1 @@
+"""Household things, and the program that makes them."""

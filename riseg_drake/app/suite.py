@@ -1,0 +1,186 @@
+"""`riseg evaluate --suite`: scenes of several kinds, one row of a table for each kind.
+
+A suite is a folder of scenarios, one YAML file a kind, in the order of their names; `1_spread.yaml` is the
+kind "spread". The built-in suites are in `riseg_drake/diagrams/suites`.
+
+out/suite_clutter_seed_100/
+    report.md  summary.json      a row a kind
+    1_spread/                    report.md  figure.png  scene_000/ ... as `riseg evaluate` leaves them
+"""
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from riseg_drake.app.evaluate import EvaluationError, scene_tasks
+from riseg_drake.app.evaluation_progress import EvaluationProgress
+from riseg_drake.app.graphics import require_graphics
+from riseg_drake.app.output import SUMMARY, OutputError, to_json
+from riseg_drake.app.scenario import Scenario, load_scenario
+from riseg_drake.app.scenario_file import ScenarioError
+from riseg_drake.app.scene_folder import SceneTask, digest, is_finished, read_json, read_result
+from riseg_drake.app.scene_pool import Pool, cluster_pool, local_pool
+from riseg_drake.app.scene_work import SceneOutcome
+from riseg_drake.app.tables import score_table
+from riseg_drake.evaluation.figure import draw_figure
+from riseg_drake.evaluation.report import FIGURE_FILE, report_text
+from riseg_drake.evaluation.scene_result import SceneResult
+from riseg_drake.evaluation.step_means import step_means
+from riseg_drake.evaluation.suite_report import KindResult, suite_figures, suite_text
+from riseg_drake.recording.whole_file import write_text
+
+REPORT = "report.md"
+SCENES = 5
+"""Of each kind, where nothing else is asked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Kind:
+    """One kind of scenes."""
+
+    folder: str
+    """The file's name without its ending, and the name of the folder of results."""
+    scenario: Scenario
+
+    @property
+    def name(self) -> str:
+        """As the table has it: without the number that orders it."""
+        return re.sub(r"^\d+_", "", self.folder).replace("_", " ")
+
+
+def suite_command(
+    suite: str,
+    scenes: int | None,
+    seed: int,
+    jobs: int,
+    output: Path | None,
+    dask: str | None,
+    console: Console,
+) -> None:
+    """Run what is missing of a suite, then write its table. Raises EvaluationError where every scene failed."""
+    kinds = find_suite(suite)
+    folder = output or Path("out") / f"suite_{Path(suite).name}_seed_{seed}"
+    tasks = {kind: kind_tasks(kind, folder, scenes or SCENES, seed) for kind in kinds}
+    if dask is None:
+        require_graphics()
+    results = evaluate_suite(tasks, folder, local_pool(jobs) if dask is None else cluster_pool(dask), console)
+    rows = [(each.name, step_means([s.scores for s in each.scenes], each.last_step)[-1]) for each in results]
+    console.print("\nafter the last interaction, means over the scenes of each kind, in percent")
+    console.print(score_table(rows, first="\nkind"))
+    console.print(f"report in {folder / REPORT}")
+    failures = [scene.failure for each in results for scene in each.scenes]
+    if all(failures):
+        raise EvaluationError(f"every scene failed; the first: {failures[0]}")
+
+
+def find_suite(name_or_folder: str) -> list[Kind]:
+    """The kinds of a built-in suite, or of a folder of scenarios. Raises ScenarioError."""
+    built_in = Path(str(files("riseg_drake.diagrams"))) / "suites"
+    folder = built_in / name_or_folder
+    if not folder.is_dir() or Path(name_or_folder).name != name_or_folder:
+        folder = Path(name_or_folder).expanduser()
+    paths = sorted(folder.glob("*.yaml"))
+    if not paths:
+        known = ", ".join(sorted(path.name for path in built_in.iterdir() if path.is_dir()))
+        raise ScenarioError(
+            f"--suite {name_or_folder}: neither a built-in suite ({known}) nor a folder of scenarios (*.yaml)"
+        )
+    kinds = [Kind(path.stem, load_scenario(path)) for path in paths]
+    for kind in kinds:
+        _ = kind.scenario.simulated  # says so where it is not
+    return kinds
+
+
+def evaluate_suite(
+    tasks: Mapping[Kind, Sequence[SceneTask]], folder: Path, pool: Pool, console: Console
+) -> list[KindResult]:
+    """Work on the scenes of all kinds that are not finished yet, and write the table.
+
+    All kinds share the pool, so that no process waits for the last scene of a kind. Raises OutputError if the
+    folder belongs to something else; KeyboardInterrupt says how far it came.
+    """
+    every = [(kind, task) for kind, group in tasks.items() for task in group]
+    about = _claim(folder, tasks)
+    todo = [task for _, task in every if not is_finished(task)]
+    outcomes: dict[Path, SceneOutcome] = {}
+    before = f", {len(every) - len(todo)} finished before" if len(todo) < len(every) else ""
+    console.print(f"{len(tasks)} kinds, {len(every)} scenes{before}; results in {folder}")
+    try:
+        with EvaluationProgress(len(every), len(every) - len(todo), console) as progress:
+            for outcome in pool(todo):
+                outcomes[outcome.task.folder] = outcome
+                progress.tell(_named(outcome), outcome.seconds)
+    except KeyboardInterrupt:
+        write_text(folder / SUMMARY, to_json({**about, "state": "interrupted"}))
+        done = sum(is_finished(task) for _, task in every)
+        raise KeyboardInterrupt(
+            f"{done} of {len(every)} scenes are finished; the same command goes on from there"
+        ) from None
+    settings = _about_text(about, tasks)
+    results = [_of_kind(kind, group, outcomes, settings) for kind, group in tasks.items()]
+    write_text(folder / REPORT, suite_text(results, settings))
+    write_text(folder / SUMMARY, to_json({**about, "state": "done", "kinds": suite_figures(results)}))
+    return results
+
+
+def kind_tasks(kind: Kind, folder: Path, scenes: int, seed: int) -> list[SceneTask]:
+    """The scenes of a kind: scene k has the seed `seed + k`; `folder` is the suite's."""
+    return scene_tasks(kind.scenario, kind.folder, folder / kind.folder, scenes, seed)
+
+
+def _of_kind(
+    kind: Kind, tasks: Sequence[SceneTask], outcomes: Mapping[Path, SceneOutcome], about: Mapping[str, object]
+) -> KindResult:
+    """The scenes of a kind, with a whole report of their own in its folder."""
+    failures = {path: outcome.failure for path, outcome in outcomes.items()}
+    scenes = [read_result(task, failures.get(task.folder, "")) for task in tasks]
+    last_step = kind.scenario.arm.most_interactions
+    folder = tasks[0].folder.parent
+    write_text(folder / REPORT, report_text(scenes, about, last_step))
+    draw_figure(scenes, last_step, folder / FIGURE_FILE)
+    return KindResult(kind.name, kind.folder, scenes, last_step)
+
+
+def _named(outcome: SceneOutcome) -> SceneResult:
+    """A result whose name says its kind, too."""
+    result = read_result(outcome.task, outcome.failure)
+    return replace(result, name=f"{outcome.task.scenario_name} {result.name}")
+
+
+def _claim(folder: Path, tasks: Mapping[Kind, Sequence[SceneTask]]) -> dict[str, Any]:
+    """Make the folder, or make sure that it is this suite's; returns what its summary begins with."""
+    settings = {
+        "seed": next(iter(tasks.values()))[0].seed,
+        "kinds_sha256": {kind.folder: digest(group[0].scenario) for kind, group in tasks.items()},
+    }
+    about = {"suite": settings, "scenes": sum(map(len, tasks.values())), "riseg_drake": version("riseg-drake")}
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f"{folder} is a file; give a folder for the output")
+    try:
+        if folder.is_dir() and any(folder.iterdir()):
+            earlier = read_json(folder / SUMMARY).get("suite")
+            if json.loads(to_json(settings)) != earlier:
+                raise OutputError(
+                    f"{folder} is not empty and holds no earlier run of this suite with this seed; give a new "
+                    "folder with --output"
+                )
+        folder.mkdir(parents=True, exist_ok=True)
+        write_text(folder / SUMMARY, to_json({**about, "state": "running"}))
+    except OSError as error:
+        raise OutputError(f"cannot write to {folder}: {error.strerror}") from None
+    return about
+
+
+def _about_text(about: Mapping[str, Any], tasks: Mapping[Kind, Sequence[SceneTask]]) -> dict[str, object]:
+    group = next(iter(tasks.values()))
+    return {
+        "scenes of each kind": f"{len(group)}, seeds {group[0].seed} to {group[-1].seed}",
+        "riseg_drake": about["riseg_drake"],
+    }

@@ -1,0 +1,115 @@
+"""The report of a suite, in Markdown: a row a kind, beside what one picture alone gives."""
+
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from riseg_drake.evaluation.report import markdown_table, percent
+from riseg_drake.evaluation.scene_result import SceneResult
+from riseg_drake.evaluation.scores import Scores
+from riseg_drake.evaluation.step_means import step_means
+
+
+@dataclass(frozen=True)
+class KindResult:
+    """All scenes of one kind."""
+
+    name: str
+    folder: str
+    """Where their results are, beside the report."""
+    scenes: Sequence[SceneResult]
+    last_step: int
+    """The interactions that a scene may have."""
+
+    def mean(self, method: str | None, step: int) -> Scores:
+        """The mean scores at a step (-1: the last) of ours (None) or of a baseline."""
+        scores = [s.scores if method is None else s.baselines.get(method, ()) for s in self.scenes]
+        return step_means(scores, self.last_step)[step]
+
+    @property
+    def interactions(self) -> float:
+        """How many were made, mean over the scenes."""
+        return float(np.mean([scene.interactions for scene in self.scenes]))
+
+    @property
+    def endings(self) -> dict[str, int]:
+        """How many scenes ended for each reason, the most frequent first."""
+        reasons = [f"failed: {s.failure}" if s.failure else _reason(s.end) for s in self.scenes]
+        return dict(Counter(reasons).most_common())
+
+
+def suite_text(kinds: Sequence[KindResult], about: Mapping[str, object]) -> str:
+    """The whole report; `about` are its settings, by name."""
+    baselines = list(dict.fromkeys(name for kind in kinds for scene in kind.scenes for name in scene.baselines))
+    head = ["kind", "scenes", "interactions", "Overlap F", "Boundary F", "found %"]
+    head += [f"{name}, {when}" for name in baselines for when in ("untouched", "last")] + ["ended"]
+    rows = []
+    for kind in kinds:
+        last = kind.mean(None, -1)
+        of_baselines = [percent(kind.mean(name, step).overlap_f) for name in baselines for step in (0, -1)]
+        rows.append(
+            [
+                f"[{kind.name}]({kind.folder}/report.md)",
+                str(len(kind.scenes)),
+                f"{kind.interactions:.1f} of {kind.last_step}",
+                percent(last.overlap_f),
+                percent(last.boundary_f),
+                percent(last.found_share),
+                *of_baselines,
+                "; ".join(f"{number} {reason}" for reason, number in kind.endings.items()),
+            ]
+        )
+    return "\n".join(
+        [
+            "# A suite of scenes\n",
+            "".join(f"- {name}: {value}\n" for name, value in about.items()),
+            markdown_table(head, rows),
+            "In percent, after the last interaction, means over the scenes of a kind. The baselines move\n"
+            "nothing: their Overlap F on the picture before the first interaction, and after the last.\n",
+            "## The scenes\n",
+            _scenes(kinds),
+        ]
+    )
+
+
+def suite_figures(kinds: Sequence[KindResult]) -> dict[str, Any]:
+    """The table as data, by the kind's folder."""
+    return {
+        kind.folder: {
+            "scenes": len(kind.scenes),
+            "interactions": kind.interactions,
+            "most_interactions": kind.last_step,
+            "scores": kind.mean(None, -1).as_dict(),
+            "baselines": {
+                name: {"untouched": kind.mean(name, 0).as_dict(), "last": kind.mean(name, -1).as_dict()}
+                for name in dict.fromkeys(name for scene in kind.scenes for name in scene.baselines)
+            },
+            "endings": kind.endings,
+        }
+        for kind in kinds
+    }
+
+
+def _scenes(kinds: Sequence[KindResult]) -> str:
+    rows = []
+    for kind in kinds:
+        for scene in kind.scenes:
+            picture = f"[{kind.name}]({kind.folder}/{scene.name}/step_{scene.interactions}/overlay.png)"
+            last = scene.scores[-1] if scene.scores else None
+            figures = ["–"] * 3
+            if last is not None:
+                found = f"{last.objects_found:g} of {last.objects_true:g}"
+                figures = [percent(last.overlap_f), percent(last.boundary_f), found]
+            rows.append(
+                [picture, str(scene.seed), str(scene.interactions), *figures, scene.failure or scene.end]
+            )
+    return markdown_table(("kind", "seed", "interactions", "Overlap F", "Boundary F", "found", "end"), rows)
+
+
+def _reason(end: str) -> str:
+    """Why a run ended, without the figures by which alike endings differ."""
+    return re.sub(r"^(\d+) of \1 interactions were made", "interactions used up", end)

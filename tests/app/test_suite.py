@@ -1,0 +1,132 @@
+import json
+import re
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from riseg_drake.app import scene_work
+from riseg_drake.app.cli import main
+from riseg_drake.app.output import OutputError, RunFolder, Step
+from riseg_drake.app.scenario_file import ScenarioError
+from riseg_drake.app.scene_pool import local_pool
+from riseg_drake.app.suite import evaluate_suite, find_suite, kind_tasks
+from riseg_drake.evaluation.baselines import BASELINES
+from riseg_drake.evaluation.scores import score
+from riseg_drake.stations.object_models import find_models
+
+QUIET = Console(quiet=True)
+SQUARE = np.zeros((48, 64), np.uint16)
+SQUARE[10:30, 10:30] = 1
+
+
+@pytest.fixture
+def runs(monkeypatch):
+    """The runs that were made, (scenario, seed), with stand-ins: ours finds all, baselines half of it."""
+    made = []
+
+    def run(scenario, seed, folder, record=False):
+        made.append((folder.path.parent.name, seed))
+        color, depth = np.zeros((48, 64, 3), np.uint8), np.full((48, 64), 0.5, np.float32)
+        for i in range(2):
+            mask = SQUARE if i else np.zeros_like(SQUARE)
+            scores = score(mask, SQUARE)
+            folder.write_step(Step(i, 0.1 * i, color, depth, mask, 1, ground_truth=SQUARE, scores=scores))
+        folder.note(state="done", end="1 of 1 interactions were made" if seed else "no push is left")
+
+    def score_baselines(scenario, folder, steps):
+        half = SQUARE.copy()
+        half[20:] = 0
+        return {name: [score(half, SQUARE), score(SQUARE, SQUARE)] for name in BASELINES}
+
+    monkeypatch.setattr(scene_work, "run", run)
+    monkeypatch.setattr(scene_work, "score_baselines", score_baselines)
+    return made
+
+
+@pytest.fixture
+def suite(tmp_path):
+    """A suite of two kinds."""
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / "2_late.yaml").write_text("arm: {most_interactions: 1}\n")
+    (folder / "1_early_bird.yaml").write_text("arm: {most_interactions: 3}\n")
+    return folder
+
+
+def tasks(suite, output, scenes=2, seed=0):
+    return {kind: kind_tasks(kind, output, scenes, seed) for kind in find_suite(str(suite))}
+
+
+def test_a_kind_is_a_file_in_the_order_of_names_and_called_without_its_number(suite):
+    assert [kind.name for kind in find_suite(str(suite))] == ["early bird", "late"]
+
+
+def test_the_table_has_a_row_a_kind_beside_the_baselines_on_first_and_last_picture(suite, tmp_path, runs):
+    output = tmp_path / "out"
+    evaluate_suite(tasks(suite, output), output, local_pool(1), QUIET)
+    assert runs == [(kind, seed) for kind in ("1_early_bird", "2_late") for seed in (0, 1)]
+    half = 100 * score(np.where(np.arange(48)[:, None] < 20, SQUARE, 0), SQUARE).overlap_f
+    row = next(line for line in (output / "report.md").read_text().splitlines() if "[late]" in line)
+    cells = [cell.strip() for cell in row.strip("|").split("|")]
+    assert cells[1:6] == ["2", "1.0 of 1", "100.0", "100.0", "100.0"]
+    assert cells[6:10] == [f"{half:.1f}", "100.0"] * 2
+    assert set(cells[10].split("; ")) == {"1 no push is left", "1 interactions used up"}
+    content = json.loads((output / "summary.json").read_text())
+    assert content["state"] == "done"
+    assert list(content["kinds"]) == ["1_early_bird", "2_late"]
+    assert (output / "2_late" / "report.md").exists(), "each kind has its whole report, too"
+
+
+def test_an_interrupted_suite_goes_on_where_it_stopped(suite, tmp_path, runs):
+    output = tmp_path / "out"
+
+    def interrupted(todo):
+        yield from local_pool(1)(todo[:3])
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt, match="3 of 4 scenes are finished; the same command goes on"):
+        evaluate_suite(tasks(suite, output), output, interrupted, QUIET)
+    evaluate_suite(tasks(suite, output), output, local_pool(1), QUIET)
+    assert len(runs) == 4
+
+
+def test_the_folder_of_something_else_is_refused(suite, tmp_path, runs):
+    output = tmp_path / "out"
+    evaluate_suite(tasks(suite, output), output, local_pool(1), QUIET)
+    with pytest.raises(OutputError, match="no earlier run of this suite with this seed"):
+        evaluate_suite(tasks(suite, output, seed=7), output, local_pool(1), QUIET)
+    RunFolder(tmp_path / "run", {})
+    with pytest.raises(OutputError, match="not empty"):
+        evaluate_suite(tasks(suite, tmp_path / "run"), tmp_path / "run", local_pool(1), QUIET)
+
+
+def test_an_unknown_suite_says_which_there_are(capsys, tmp_path):
+    with pytest.raises(ScenarioError, match=r"neither a built-in suite \(.*clutter.*\)"):
+        find_suite("clatter")
+    assert main(["evaluate", "--suite", str(tmp_path)]) == 2
+
+
+def test_clutter_has_nine_kinds_with_the_layouts_and_pushes_that_they_are_known_by():
+    kinds = {kind.name: kind.scenario for kind in find_suite("clutter")}
+    assert {name: scenario.arm.most_interactions for name, scenario in kinds.items()} == {
+        "spread": 5,
+        "packed": 6,
+        "crowd": 10,
+        "pile": 8,
+        "white on white": 5,
+        "black": 5,
+        "wood hard light": 5,
+        "low": 5,
+        "view at 45 degrees": 5,
+    }
+    for name in ("packed", "crowd", "pile"):
+        assert kinds[name].station.scene.layout == name
+    for scenario in kinds.values():
+        scene = scenario.station.scene
+        if scene.names:
+            assert len(find_models(scene.objects, scene.names)) >= 6
+    low = kinds["low"].station.scene
+    for model in find_models(low.objects, low.names):
+        assert 0.0049 <= np.ptp(model.corners[:, 2]) <= 0.0091
+    assert re.fullmatch(r"0\.785\d*", f"{kinds['view at 45 degrees'].station.observe_tilt}")
