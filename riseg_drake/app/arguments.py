@@ -53,8 +53,8 @@ def command_line() -> argparse.ArgumentParser:
     evaluate.add_argument(
         "--suite",
         metavar="NAME",
-        help="scenes of several kinds, a row each: clutter, or a folder of YAML files, one a kind; or films, of "
-        "still things by a camera that moves and errs",
+        help="scenes of several kinds, a row each: clutter, or a folder of YAML files, one a kind; films: "
+        "of still things by a camera that moves and errs",
     )
     evaluate.add_argument(
         "--scenes", type=_positive, metavar="N", help="how many (20); of a suite, of each kind (5)"

@@ -129,4 +129,4 @@ def test_clutter_has_nine_kinds_with_the_layouts_and_pushes_that_they_are_known_
     low = kinds["low"].station.scene
     for model in find_models(low.objects, low.names):
         assert 0.0049 <= np.ptp(model.corners[:, 2]) <= 0.0091
-    assert re.fullmatch(r"0\.785\d*", f"{kinds['view at 45 degrees'].station.observe_tilt}")
+    assert re.fullmatch(r"0\.785\d*", f"{kinds['view at 45 degrees'].station.observe_pitch}")
