@@ -30,6 +30,8 @@ from riseg_drake.robot.supervisor import (
 from riseg_drake.robot.target_playout import PlayoutParameters, TargetPlayout
 
 POSITION, VELOCITY = "position", "velocity"
+STANDING = 0.1
+"""An arm stands still this long after its commands do, s: the driver's filter of 30 Hz has died away."""
 LONGEST_STOP = 0.25
 """A stop must be possible in this time, s: 0.3 s less some periods in which its cause is noticed."""
 
@@ -130,6 +132,7 @@ class CommandStream:
         self._drift_seen = np.zeros(7)
         self._drift_taken_back = np.zeros(7, bool)
         self._contacts: list[tuple[float, float]] = []
+        self._standing = 0.0  # s, for which the arm has stood in a pause
         self._status: ArmStatus | None = None
         self.state = SafetyState()
         self.words = 0
@@ -222,7 +225,21 @@ class CommandStream:
             self._limiter.stop()
         if not self.state.may_move:
             self._playout.halt()
+        self._note_where_it_stands(seen)
         return self._fall_silent() if self._has_no_hearer(seen) else self._command()
+
+    def _note_where_it_stands(self, seen: Observation) -> None:
+        """Velocity mode: in a pause the arm is held where it came to rest, which no sum of velocities tells.
+
+        Only while its status goes on: nobody can have moved it by hand, and from there on nobody may.
+        """
+        paused = self.state.mode is Mode.PAUSED and self.state.cause is Cause.IMAGES_OLD
+        if self.mode != VELOCITY or not paused or self._limiter is None or not self._limiter.at_rest:
+            self._standing = 0.0
+            return
+        self._standing += self.period
+        if self._standing - self.period < STANDING <= self._standing and self._status is not None:
+            self._drift = self._limiter.position - self._status.position
 
     def _set_out(self, before: SafetyState, status: ArmStatus) -> None:
         """Begin to move, or go on after a pause, at the path's nearest point; stay where that is too far."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from riseg_drake.robot.command_stream import LONGEST_STOP
+from riseg_drake.robot.command_stream import LONGEST_STOP, CommandStream
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.supervisor import REFLEX, USER_STOPPED, Cause, Mode, SafetyState
 from tests.robot.lab import PERIOD, Lab
@@ -203,3 +203,33 @@ def test_an_arm_that_is_far_away_when_its_status_comes_again_hears_not_even_a_st
     lab.run(1.0)
     assert lab.stream.state.cause is Cause.STATUS_ENDED
     assert not lab.sent()
+
+
+def paused_in_motion(drifted):
+    """An arm in velocity mode that came off its commands by `drifted` rad on its way, pictures having ended."""
+    lab = Lab("velocity")
+    lab.go(READY + np.array([0.8, 0, 0, 0, 0, 0, 0]))
+    lab.run(1.2)
+    assert lab.speeds[-1].max() > CommandStream.SLOW
+    lab.q = lab.q + np.array([drifted, 0, 0, 0, 0, 0, 0])
+    lab.delay_images()
+    lab.run(0.5)
+    assert lab.stream.state == SafetyState(Mode.PAUSED, Cause.IMAGES_OLD)
+    return lab
+
+
+def test_in_velocity_mode_drift_on_the_way_is_no_reason_to_stop_after_a_pause():
+    lab = paused_in_motion(0.018)
+    lab.show_images()
+    lab.run(6.0)
+    assert lab.stream.state.mode is Mode.FOLLOWING
+    assert np.abs(lab.q - lab.path.value(lab.path.end_time())[:, 0]).max() < 0.002
+
+
+def test_but_an_arm_that_was_moved_while_it_stood_stops():
+    lab = paused_in_motion(0.018)
+    lab.q = lab.q + 0.012
+    lab.run(0.05)
+    lab.show_images()
+    lab.run(1.0)
+    assert lab.stream.state == SafetyState(Mode.STOPPED, Cause.MOVED)
