@@ -215,7 +215,7 @@ def _objects(
 def _texture(depth: NDArray, ray_W: NDArray, eye_W: NDArray, rng: np.random.Generator) -> NDArray:
     """Grain of wood along a direction, and checks, on everything alike."""
     p_WQ = eye_W + np.where(np.isfinite(depth), depth, 0)[..., None] * ray_W
-    across = p_WQ @ Rotation.random(rng=rng).as_matrix()
+    across = p_WQ @ Rotation.random(None, rng).as_matrix()
     grain = 10 * np.sin(across[..., 0] * 90 + 3 * np.sin(across[..., 1] * 9))
     checks = 8 * np.sign(np.sin(across[..., 1] * 60) * np.sin(across[..., 2] * 60))
     return (rng.choice([0.0, 1.0]) * grain + rng.choice([0.0, 1.0]) * checks)[..., None]
