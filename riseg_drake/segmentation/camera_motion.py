@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from riseg_drake.geometry.camera import project, rays, rays_at
 from riseg_drake.geometry.plane import transform_plane
@@ -32,6 +32,10 @@ _RIM = np.ones((21, 21), np.uint8)
 """So far from an outline, in pixels, flow of one side leaks to the other."""
 _CORRELATED = 9.0
 """Points of flow sampled a dozen pixels apart that are worth one."""
+_STILL_TABLE, _STILL_ALL = 0.75, 0.5
+"""Shares of the points of the table, and of all points, that surely stand still. What is left between expected
+and observed flow has long tails, since depth errs; its standard deviation is read off as far out as what moves
+may allow."""
 _FIT_ROUNDS, _HYPOTHESES, _VOTERS = 5, 128, 500
 
 
@@ -145,11 +149,13 @@ def settled_pair(
     # The error of both poses enters, as it does between consecutive frames.
     change = table_change(pair.reference, above_0.plane_W, pair.current, above_1.plane_W)
     same_plane = np.linalg.norm(change[0]) < parameters.tilt_max and abs(change[1]) < parameters.height_max
-    judges = on_table if np.count_nonzero(on_table) >= 200 else np.ones(len(p_C0Q), bool)
+    enough_table = np.count_nonzero(on_table) >= 200
+    judges = on_table if enough_table else np.ones(len(p_C0Q), bool)
+    still = _STILL_TABLE if enough_table else _STILL_ALL
 
     def residual(X_C1C0: NDArray) -> float:
         apart = uv_1[judges] - project(move_points(X_C1C0, p_C0Q[judges]), intrinsics)
-        return float(1.4826 * np.median(np.abs(apart)))
+        return float(np.quantile(np.abs(apart), still) / norm.ppf(0.5 + still / 2))
 
     as_given = residual(pair.X_C1C0)
     for believed in (change, None) if same_plane else (None,):
