@@ -306,11 +306,7 @@ class _Session:
         config = self._config
         try:
             return observation_posture(
-                kinematics,
-                config.centre_W,
-                config.observe_height,
-                config.start_position,
-                config.observe_pitch,
+                kinematics, config.centre_W, config.observe_height, config.start_position, config.observe_pitch
             )
         except ValueError as error:
             raise ScenarioError(str(error)) from None

@@ -22,19 +22,19 @@ from rich.console import Console
 from riseg_drake.app.evaluate import EvaluationError, scene_tasks
 from riseg_drake.app.evaluation_progress import EvaluationProgress
 from riseg_drake.app.graphics import require_graphics
-from riseg_drake.app.output import SUMMARY, OutputError, to_json
+from riseg_drake.app.output_folder import SUMMARY, OutputError, to_json
 from riseg_drake.app.scenario import Scenario, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.scene_folder import SceneTask, digest, is_finished, read_json, read_result
 from riseg_drake.app.scene_pool import Pool, cluster_pool, local_pool
 from riseg_drake.app.scene_work import SceneOutcome
 from riseg_drake.app.tables import score_table
-from riseg_drake.evaluation.figure import draw_figure
+from riseg_drake.evaluation.figure import figure_png
 from riseg_drake.evaluation.report import FIGURE_FILE, report_text
 from riseg_drake.evaluation.scene_result import SceneResult
 from riseg_drake.evaluation.step_means import step_means
 from riseg_drake.evaluation.suite_report import KindResult, suite_figures, suite_text
-from riseg_drake.recording.whole_file import write_text
+from riseg_drake.recording.whole_file import write_bytes, write_text
 
 REPORT = "report.md"
 SCENES = 5
@@ -144,7 +144,7 @@ def _of_kind(
     last_step = kind.scenario.arm.most_interactions
     folder = tasks[0].folder.parent
     write_text(folder / REPORT, report_text(scenes, about, last_step))
-    draw_figure(scenes, last_step, folder / FIGURE_FILE)
+    write_bytes(folder / FIGURE_FILE, figure_png(scenes, last_step))
     return KindResult(kind.name, kind.folder, scenes, last_step)
 
 

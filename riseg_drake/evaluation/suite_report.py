@@ -32,7 +32,7 @@ class KindResult:
 
     @property
     def interactions(self) -> float:
-        """How many were made, mean over the scenes."""
+        """Number of interactions that were made, mean over the scenes."""
         return float(np.mean([scene.interactions for scene in self.scenes]))
 
     @property

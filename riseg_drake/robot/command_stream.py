@@ -7,7 +7,6 @@ once the arm's status is too old and the commands are at rest nothing is sent, a
 nothing is until the operator says so. What is sent first then is where the arm was measured to be.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -28,6 +27,7 @@ from riseg_drake.robot.supervisor import (
     supervise,
 )
 from riseg_drake.robot.target_playout import PlayoutParameters, TargetPlayout
+from riseg_drake.robot.tip_geometry import TipGeometry
 
 POSITION, VELOCITY = "position", "velocity"
 STANDING = 0.1
@@ -82,21 +82,6 @@ class ArmStatus:
     gap: float | None = None
     """Largest time between the stamps of two statuses, one after the other, from the one that was handed on
     before this up to this one, s; None where those in between were not seen."""
-
-
-@dataclass(frozen=True)
-class TipGeometry:
-    """What the command path needs to know of the arm's shape."""
-
-    position: Callable[[NDArray], NDArray[np.float64]]
-    """q [7] -> p_WE [3], m."""
-    jacobian: Callable[[NDArray], NDArray[np.float64]]
-    """q [7] -> J [6, 7] with V_WE = J dq/dt."""
-
-    def force(self, q: NDArray, torque: NDArray) -> float:
-        """Size of the force at the tip, N, that explains external torques [7] best."""
-        wrench = np.linalg.lstsq(self.jacobian(q).T, torque, rcond=0.02)[0]
-        return float(np.linalg.norm(wrench[3:]))
 
 
 class CommandStream:

@@ -22,10 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.lcm import DrakeLcm
 
-from riseg_drake.robot.command_stream import CommandParameters, CommandStream, TipGeometry
+from riseg_drake.robot.command_stream import CommandParameters, CommandStream
 from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.robot.supervisor import Cause
+from riseg_drake.robot.tip_geometry import TipGeometry
 from riseg_drake.stations.command_session import CommandSession, StreamReport, command_message
 from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm

@@ -25,7 +25,7 @@ def evaluation(tmp_path):
         (tmp_path / "theirs" / "scene_000" / f"step_{i}").mkdir(parents=True)
         write_png(tmp_path / "theirs" / "scene_000" / f"step_{i}" / "mask.png", TRUTH * (3 * i))
     ours = [score(np.zeros_like(TRUTH), TRUTH)] * 2
-    return task, SceneResult("scene_000", 0, "", "done", ours), tmp_path / "theirs"
+    return task, SceneResult("scene_000", 0, "", "done", scores=ours), tmp_path / "theirs"
 
 
 def test_another_methods_masks_get_their_row(evaluation):

@@ -34,7 +34,7 @@ class Room:
         script = Script([push_to(THERE, limits=self.limits), push_to(THERE, at=0.1, limits=self.limits)])
         self.motion = builder.AddSystem(ArmMotion(Q_OBSERVE, None, None, self.done_until, self.way_back.take))
         eyes = builder.AddSystem(Eyes(script))
-        for name in ("pair", "mask", "push"):
+        for name in ("pair", "mask", "decision"):
             builder.Connect(eyes.GetOutputPort(name), self.motion.GetInputPort(name))
         builder.Connect(self.motion.GetOutputPort("interaction_step"), eyes.GetInputPort("interaction_step"))
         self.measured = builder.AddSystem(ConstantVectorSource(Q_OBSERVE))

@@ -7,7 +7,8 @@ from rich.console import Console
 
 from riseg_drake.app import scene_work
 from riseg_drake.app.cli import main
-from riseg_drake.app.output import OutputError, RunFolder, Step
+from riseg_drake.app.output import RunFolder, Step
+from riseg_drake.app.output_folder import OutputError
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.scene_pool import local_pool
 from riseg_drake.app.suite import evaluate_suite, find_suite, kind_tasks

@@ -3,10 +3,11 @@
 import numpy as np
 
 from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest
-from riseg_drake.robot.command_stream import ArmStatus, CommandParameters, CommandStream, TipGeometry
+from riseg_drake.robot.command_stream import ArmStatus, CommandParameters, CommandStream
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.limits import PANDA_LIMITS
 from riseg_drake.robot.supervisor import MOVE
+from riseg_drake.robot.tip_geometry import TipGeometry
 
 PERIOD, TICK = 0.005, 0.001
 """Of commands and of the robot, s."""

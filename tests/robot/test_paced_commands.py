@@ -1,11 +1,12 @@
 import numpy as np
 import pytest
 
-from riseg_drake.robot.command_stream import ArmStatus, CommandParameters, CommandStream, TipGeometry
+from riseg_drake.robot.command_stream import ArmStatus, CommandParameters, CommandStream
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.limits import PANDA_LIMITS
 from riseg_drake.robot.paced_commands import LONGEST_PAUSE, PacedCommands
 from riseg_drake.robot.supervisor import MOVE
+from riseg_drake.robot.tip_geometry import TipGeometry
 
 WALL, STEADY, PERIOD = 1_700_000_000.0, 5000.0, 0.005
 FAST = 0.25 * np.sin(np.arange(7))  # rad/s

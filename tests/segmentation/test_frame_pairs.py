@@ -54,7 +54,7 @@ def test_the_reference_stays_while_things_move_and_is_renewed_beyond_the_span() 
 
 
 def test_a_pair_knows_how_far_things_had_moved_since_its_reference() -> None:
-    pair, spans = None, []
+    pair, spans = NO_PAIR, []
     for newest, before in zip([frame(k) for k in range(6)], [0, 0, 3, 7, 11, 2], strict=True):
         pair = next_pair(pair, newest, before, FramePairParameters(flow_span_share=10.0 / CAMERA.width))
         spans.append(pair.span)

@@ -9,9 +9,10 @@ commands).
 import numpy as np
 from drake import lcmt_image_array
 
-from riseg_drake.robot.command_stream import CommandParameters, CommandStream, TipGeometry
+from riseg_drake.robot.command_stream import CommandParameters, CommandStream
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.limits import PANDA_LIMITS
+from riseg_drake.robot.tip_geometry import TipGeometry
 from riseg_drake.stations.command_session import CommandSession, command_message
 from riseg_drake.stations.ideal_arm import status_message
 from riseg_drake.stations.panda_driver import PandaDriver, PandaDriverConfig

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from drake import lcmt_panda_status
 
-from riseg_drake.robot.command_stream import CommandParameters, CommandStream, TipGeometry
+from riseg_drake.robot.command_stream import CommandParameters, CommandStream
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.limits import PANDA_LIMITS
 from riseg_drake.robot.supervisor import Cause, Mode
+from riseg_drake.robot.tip_geometry import TipGeometry
 from riseg_drake.stations.command_session import CommandSession
 from riseg_drake.stations.ideal_arm import status_message
 from tests.stations.mutated_messages import (

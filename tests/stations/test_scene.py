@@ -336,7 +336,7 @@ def test_a_tower_of_boxes_is_at_rest_and_known_as_a_pile(tmp_path):
     assert table.touching() == {frozenset(pair) for pair in ((0, 1), (1, 2), (2, 3))}
     for before, after in zip(tower, table.objects(), strict=True):
         shift = after.X_WB.translation() - before.X_WB.translation()
-        assert np.linalg.norm(shift[:2]) < 1e-4
+        assert np.linalg.norm(shift[:2]) < 2e-4
         assert -3e-4 < shift[2] < 0  # pressed in by its own weight, three deep
 
 

@@ -339,7 +339,7 @@ def test_a_proposal_is_withdrawn_when_the_arm_is_led_away():
     builder = DiagramBuilder()
     motion = builder.AddSystem(ArmMotion(Q_OBSERVE, None, lambda _: Permission.WAIT, way_back=ways_back(60)))
     eyes = builder.AddSystem(Eyes(Script([push])))
-    for name in ("pair", "mask", "push"):
+    for name in ("pair", "mask", "decision"):
         builder.Connect(eyes.GetOutputPort(name), motion.GetInputPort(name))
     builder.Connect(motion.GetOutputPort("interaction_step"), eyes.GetInputPort("interaction_step"))
     builder.Connect(motion.GetOutputPort("position"), motion.GetInputPort("position_measured"))
