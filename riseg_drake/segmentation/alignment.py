@@ -103,7 +103,7 @@ def align_motions(
     """
     if not len(edges.piece) or parameters.rounds == 0:
         return motions
-    image_1 = _image(pair, depth_noise)
+    image_1 = rigid_fit(pair, depth_noise)
     cost = edge_costs(pair, edges, motions, depth_noise)
     pieces = int(edges.piece.max()) + 1
     owner = np.argmin([np.bincount(edges.piece, c, pieces) for c in cost], axis=0)[edges.piece]
@@ -139,14 +139,14 @@ def edge_costs(
 ) -> NDArray[np.float32]:
     """How badly standing still and each motion [G, 4, 4] explain each edge pixel, [1 + G, N]: 2 where it is
     right, 18 at most."""
-    image_1 = _image(pair, depth_noise)
+    image_1 = rigid_fit(pair, depth_noise)
     return np.array([image_1.cost(edges, motion) for motion in (np.eye(4), *motions)])
 
 
 def _propose(
-    image_1: "_Image",
+    image_1: "RigidFit",
     edges: EdgePixels,
-    far_image: "_Image",
+    far_image: "RigidFit",
     far_edges: EdgePixels,
     motions: list[NDArray],
     parameters: AlignmentParameters,
@@ -199,15 +199,16 @@ def has_contrast(variance: NDArray[np.float32], noise: MeasurementNoise) -> NDAr
     return variance - np.float32(2 * noise.color**2) > least
 
 
-def _image(pair: FramePair, depth_noise: float) -> "_Image":
+def rigid_fit(pair: FramePair, depth_noise: float) -> "RigidFit":
+    """Of the frame of t of a pair; `depth_noise` is that of depth at 1 m, m."""
     current = pair.current
     noise = float(np.sqrt(2)) * depth_noise
-    return _Image(pair.X_C1C0, current.intrinsics, current.unhidden_gray, current.unhidden_depth, noise)
+    return RigidFit(pair.X_C1C0, current.intrinsics, current.unhidden_gray, current.unhidden_depth, noise)
 
 
 @dataclass(frozen=True)
-class _Image:
-    """The frame of t: what pixels of t-1 find there."""
+class RigidFit:
+    """The frame of t: what pixels of t-1 find there, and the motion that fits them."""
 
     X_C1C0: NDArray[np.float64]
     intrinsics: Intrinsics

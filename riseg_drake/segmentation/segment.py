@@ -32,11 +32,16 @@ from riseg_drake.segmentation.motions import (
     with_earlier_motions,
 )
 from riseg_drake.segmentation.propagation import carry_labels
+from riseg_drake.segmentation.segment_by_evidence import EvidenceParameters
 
 
 @dataclass
 class SegmentParameters:
     """All of line 7."""
+
+    method: str = field(default="rules", metadata={"choices": ("rules", "evidence")})
+    """"rules" (this file, by the fields below) or "evidence" (segment_by_evidence.py, in trial)."""
+    evidence: EvidenceParameters = field(default_factory=EvidenceParameters)
 
     outline: str = field(default="motion", metadata={"choices": ("motion", "flow")})
     """"motion" (which motion explains a pixel, motion_labels.py) or "flow" (breadth first search over

@@ -114,3 +114,31 @@ def _with_borders(label: NDArray[np.intp], count: int, image: NDArray[np.uint8])
     code = np.flatnonzero(length)
     borders = np.stack(np.divmod(code, max(count, 1)), axis=1)
     return Superpixels(label, count, borders, length[code], difference[code] / length[code])
+
+
+_CRUMB = 5
+"""Pixels; a smaller part of a superpixel beyond a known border goes with the rest."""
+
+
+def split_superpixels(
+    cut: Superpixels,
+    bodies: NDArray[np.integer],
+    color: NDArray[np.uint8],
+    height: NDArray[np.float32],
+) -> Superpixels:
+    """The superpixels, split where a label image [H, W] has a border."""
+    inside = cut.label >= 0
+    if not inside.any():
+        return cut
+    count = int(bodies.max()) + 1
+    code, part, pixels = np.unique(
+        cut.label[inside] * count + bodies[inside], return_inverse=True, return_counts=True
+    )
+    of = code // count
+    largest = np.empty(cut.count, np.intp)
+    by_size = np.argsort(pixels, kind="stable")
+    largest[of[by_size]] = by_size
+    target = np.where(pixels >= _CRUMB, np.arange(len(code)), largest[of])
+    label = np.full(cut.label.shape, -1, np.intp)
+    kept, label[inside] = np.unique(target[part], return_inverse=True)
+    return _with_borders(label, len(kept), _edges_image(color, height))

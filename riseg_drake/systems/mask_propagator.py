@@ -9,6 +9,11 @@ from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
 from riseg_drake.segmentation.bfif import BFIFParameters, no_groups
 from riseg_drake.segmentation.optical_flow import NO_FLOW
 from riseg_drake.segmentation.segment import Segmentation, SegmentParameters, nothing_segmented, segment
+from riseg_drake.segmentation.segment_by_evidence import (
+    EvidentSegmentation,
+    nothing_evident,
+    segment_by_evidence,
+)
 from riseg_drake.systems.stage_clock import timed
 
 
@@ -57,7 +62,8 @@ class MaskPropagator(LeafSystem):
                 ("above_table", NOTHING_ABOVE_TABLE),
             )
         )
-        nothing = AbstractValue.Make(nothing_segmented(intrinsics.shape))
+        begin = nothing_evident if self._parameters.method == "evidence" else nothing_segmented
+        nothing = AbstractValue.Make(begin(intrinsics.shape))
         self._state = self.DeclareAbstractState(nothing)
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, offset, self._update)
         self.DeclareAbstractOutputPort(
@@ -79,7 +85,7 @@ class MaskPropagator(LeafSystem):
             prerequisites_of_calc={self.all_state_ticket()},
         )
 
-    def _segmentation(self, context: Context) -> Segmentation:
+    def _segmentation(self, context: Context) -> Segmentation | EvidentSegmentation:
         return context.get_abstract_state(self._state).get_value()
 
     def _update(self, context: Context, state: State) -> None:
@@ -92,7 +98,12 @@ class MaskPropagator(LeafSystem):
     def _segment(self, context: Context, state: State, pair: FramePair) -> None:
         expected_flow, optical_flow, groups, above_0, above_1 = (s.Eval(context) for s in self._stages)
         before = self._segmentation(context)
-        following = segment(
-            before, pair, expected_flow, optical_flow, groups, above_0, above_1, self._parameters, self._bfif
-        )
+        parameters, bfif = self._parameters, self._bfif
+        following: Segmentation | EvidentSegmentation
+        if isinstance(before, EvidentSegmentation):
+            following = segment_by_evidence(before, pair, groups, above_0, above_1, parameters.evidence, bfif)
+        else:
+            following = segment(
+                before, pair, expected_flow, optical_flow, groups, above_0, above_1, parameters, bfif
+            )
         state.get_mutable_abstract_state(self._state).set_value(following)

@@ -13,6 +13,7 @@ from riseg_drake.segmentation.frame_pairs import FramePairParameters, next_pair
 from riseg_drake.segmentation.motions import BFIFGroups
 from riseg_drake.segmentation.optical_flow import DisFlow, FlowMethod
 from riseg_drake.segmentation.segment import Segmentation, SegmentParameters, nothing_segmented, segment
+from riseg_drake.segmentation.segment_by_evidence import nothing_evident, segment_by_evidence
 
 
 @dataclass
@@ -41,8 +42,13 @@ class Algorithm:
         rng = np.random.default_rng([0, frame.sequence])
         self.groups = groups or group_body_frames(self.pair, e_t, o_t, above_0, self.bfif, rng)
         self.inputs = (self.pair, e_t, o_t, self.groups, above_0, above_1, self.segment, self.bfif)
-        before = self.answer or nothing_segmented(frame.depth.shape)
-        self.answer = segment(before, *self.inputs)
+        if self.segment.method == "evidence":
+            before = self.answer or nothing_evident(frame.depth.shape)
+            seen = (self.pair, self.groups, above_0, above_1)
+            self.answer = segment_by_evidence(before, *seen, self.segment.evidence, self.bfif)
+        else:
+            before = self.answer or nothing_segmented(frame.depth.shape)
+            self.answer = segment(before, *self.inputs)
         return self.answer
 
 

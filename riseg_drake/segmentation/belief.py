@@ -1,0 +1,217 @@
+"""What is believed of a keyframe: which borders lie inside one body, what has moved, and the ids."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
+from riseg_drake.segmentation.above_table import AboveTable
+from riseg_drake.segmentation.association import UNKNOWN
+from riseg_drake.segmentation.border_prior import BorderPriorParameters, border_prior
+from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe
+from riseg_drake.segmentation.noise import MeasurementNoise
+from riseg_drake.segmentation.observation import Observation
+from riseg_drake.segmentation.partition import PartitionParameters, moved_parts, partition, with_ids
+from riseg_drake.segmentation.propagation import carry_labels
+
+_NEVER_MOVED = -3.0
+"""Log-odds of having moved of what has not been seen moving: three nats for standing still."""
+
+
+@dataclass
+class BeliefParameters:
+    """How evidence is kept."""
+
+    keyframe: KeyframeParameters = field(default_factory=KeyframeParameters)
+    prior: BorderPriorParameters = field(default_factory=BorderPriorParameters)
+    partition: PartitionParameters = field(default_factory=PartitionParameters)
+    inside: float = 2.0
+    """Evidence of a border that lies inside what was one superpixel before, nats."""
+    most: float = 12.0
+    """Evidence of a border adds up to no more than that, nats, so that it can be revised."""
+
+
+@dataclass(frozen=True)
+class Belief(Immutable):
+    """Of N superpixels and M borders."""
+
+    keyframe: Keyframe
+    prior: NDArray[np.float64]
+    """[M], log-odds that both sides of a border are one body, by the still picture."""
+    evidence: NDArray[np.float64]
+    """[M], what motion has added."""
+    moved: NDArray[np.float64]
+    """[N], log-odds of ever having moved."""
+    body: NDArray[np.intp]
+    """[N], ids; 0 where nothing has moved yet."""
+    next_id: int
+
+    @property
+    def bond(self) -> NDArray[np.float64]:
+        """[M], log-odds that both sides of a border are one body."""
+        return self.prior + self.evidence
+
+
+@dataclass(frozen=True)
+class Bodies(Immutable):
+    """The bodies of a keyframe, and how they have moved since."""
+
+    body: NDArray[np.intp]
+    """[N], ids; 0 where nothing has moved yet."""
+    part: NDArray[np.intp]
+    """[N], of the partition, what has not moved included."""
+    motion: NDArray[np.intp]
+    """[N], index into `motions_K`; the same for all of a body."""
+    motions_K: NDArray[np.float64]
+    """[G, 4, 4], seen from the keyframe's camera; the first is standing still."""
+    next_id: int
+
+
+def first_belief(
+    frame: Frame, above: AboveTable, noise: MeasurementNoise, parameters: BeliefParameters
+) -> Belief:
+    """Nothing has moved yet."""
+    keyframe = make_keyframe(frame, above, noise, parameters.keyframe)
+    return Belief(
+        keyframe=keyframe,
+        prior=border_prior(keyframe, parameters.prior),
+        evidence=np.zeros(len(keyframe.borders)),
+        moved=np.full(keyframe.count, _NEVER_MOVED),
+        body=np.zeros(keyframe.count, np.intp),
+        next_id=1,
+    )
+
+
+def standing(belief: Belief) -> Bodies:
+    """The bodies where nothing has moved since the keyframe."""
+    still = np.zeros(belief.keyframe.count, np.intp)
+    return Bodies(belief.body, still, still, np.eye(4)[None], belief.next_id)
+
+
+def bodies_of(belief: Belief, seen: Observation, before: Bodies | None, parameters: BeliefParameters) -> Bodies:
+    """The bodies, with what one frame says; ids are those of the belief, and for what it did not know those of
+    the frame before."""
+    keyframe = belief.keyframe
+    part = partition(keyframe, belief.bond + seen.evidence, parameters.partition)
+    moved = moved_parts(part, np.maximum(belief.moved, seen.moved), parameters.partition)
+    previous = [belief.body] if before is None else [belief.body, before.body]
+    next_id = belief.next_id if before is None else before.next_id
+    body, next_id = with_ids(part, moved, keyframe.area, previous, next_id)
+    # A body is rigid: it has the motion that explains all of it best.
+    ids, index = np.unique(body, return_inverse=True)
+    total = np.array([np.bincount(index, m * seen.costs.witnesses, len(ids)) for m in seen.costs.misfit])
+    motion = np.where(body > 0, total.argmin(0)[index], 0)
+    return Bodies(body, part, motion, seen.motions_K, next_id)
+
+
+def carry_bodies(
+    belief: Belief, bodies: Bodies, frame: Frame, above: AboveTable, remembered: NDArray[np.uint16]
+) -> NDArray[np.uint16]:
+    """[H, W], ids in the view of a frame, UNKNOWN where something stands that has not moved, 0 elsewhere.
+
+    `remembered` [H, W] has ids where things that the keyframe does not see should be now.
+    """
+    # One label for each body and motion, then one for each remembered id.
+    rigid, label = np.unique(np.stack([bodies.body, bodies.motion]), axis=1, return_inverse=True)
+    hidden, number = np.unique(remembered, return_inverse=True)
+    ids = np.concatenate([[0], np.where(rigid[0] > 0, rigid[0], UNKNOWN), hidden]).astype(np.uint16)
+    number = np.where(remembered > 0, number.reshape(remembered.shape) + 1 + rigid.shape[1], 0)
+    moves = {i + 1: bodies.motions_K[g] for i, g in enumerate(rigid[1]) if g > 0}
+    carried = _carry(belief, label.ravel() + 1, moves, frame, above, number)
+    return np.where(carried == UNKNOWN, UNKNOWN, ids[np.where(carried == UNKNOWN, 0, carried)])
+
+
+def next_belief(
+    belief: Belief,
+    seen: Observation | None,
+    bodies: Bodies,
+    frame: Frame,
+    above: AboveTable,
+    remembered: NDArray[np.uint16],
+    noise: MeasurementNoise,
+    parameters: BeliefParameters,
+) -> Belief:
+    """The belief, with what was seen, carried to a frame that becomes the keyframe."""
+    old = belief.keyframe
+    moves = {s + 1: bodies.motions_K[g] for s, g in enumerate(bodies.motion) if g > 0}
+    carried = _carry(belief, np.arange(old.count) + 1, moves, frame, above, np.zeros_like(remembered))
+    carried = np.where(carried == UNKNOWN, 0, carried).astype(np.intp)
+    ids = np.append(bodies.body, 0)[carried - 1]
+    ids = np.where((carried == 0) & (remembered != UNKNOWN), remembered, ids)
+    new = make_keyframe(frame, above, noise, parameters.keyframe, ids)
+    source = _most_seen(new, carried) - 1
+    known = source >= 0
+    evidence, moved = belief.evidence, belief.moved
+    if seen is not None:
+        evidence = np.clip(evidence + seen.evidence, -parameters.most, parameters.most)
+        moved = np.maximum(moved, seen.moved)
+    body = np.where(known, bodies.body[source], _most_seen(new, np.where(carried == 0, ids, 0)))
+    prior = border_prior(new, parameters.prior)
+    return Belief(
+        keyframe=new,
+        prior=prior,
+        evidence=_carried_evidence(old, belief.prior, evidence, new, prior, source, body, parameters),
+        moved=np.where(known, moved[source], np.where(body > 0, -_NEVER_MOVED, _NEVER_MOVED)),
+        body=body,
+        next_id=bodies.next_id,
+    )
+
+
+def _carried_evidence(
+    old: Keyframe,
+    old_prior: NDArray[np.float64],
+    old_evidence: NDArray[np.float64],
+    new: Keyframe,
+    new_prior: NDArray[np.float64],
+    source: NDArray[np.intp],
+    body: NDArray[np.intp],
+    parameters: BeliefParameters,
+) -> NDArray[np.float64]:
+    """Evidence [M] for the borders of the new keyframe, whose superpixels come from old ones, `source` [N]."""
+    a, b = new.borders.T
+    from_a, from_b = source[a], source[b]
+    code = np.minimum(from_a, from_b) * old.count + np.maximum(from_a, from_b)
+    old_code = old.borders[:, 0] * old.count + old.borders[:, 1]  # rising
+    place = np.clip(np.searchsorted(old_code, code), 0, max(len(old_code) - 1, 0))
+    known = (from_a >= 0) & (from_b >= 0)
+    if len(old_code):
+        same_border = known & (from_a != from_b) & (old_code[place] == code)
+        # A gap that was seen once is remembered when it has closed.
+        remembered = old_evidence[place] + np.minimum(old_prior[place] - new_prior, 0)
+    else:
+        same_border, remembered = np.zeros(len(a), bool), np.zeros(len(a))
+    apart = np.where(
+        body[a] == body[b], np.where(body[a] > 0, parameters.inside / 2, 0), -2 * parameters.inside
+    )
+    evidence = np.where(known & (from_a == from_b), parameters.inside, np.where(same_border, remembered, apart))
+    return np.where(known | (body[a] > 0) | (body[b] > 0), evidence, 0.0)
+
+
+def _carry(
+    belief: Belief,
+    label: NDArray[np.intp],
+    moves: Mapping[int, NDArray[np.float64]],
+    frame: Frame,
+    above: AboveTable,
+    remembered: NDArray[np.integer],
+) -> NDArray[np.uint16]:
+    """Labels > 0 of superpixels [N], of which some moved by motions [4, 4], in the view of a frame [H, W]."""
+    keyframe = belief.keyframe
+    pair, label_0 = FramePair(keyframe.frame, frame), keyframe.image_of(label.astype(np.uint16))
+    return carry_labels(pair, label_0, moves, above, remembered.astype(np.uint16))
+
+
+def _most_seen(keyframe: Keyframe, image: NDArray[np.integer]) -> NDArray[np.intp]:
+    """The value >= 0 of an image [H, W] that each superpixel [N] shows most."""
+    label = keyframe.superpixels.label
+    inside = label >= 0
+    values = image[keyframe.region][inside].astype(np.intp)
+    count = int(values.max(initial=0)) + 1
+    code, pixels = np.unique(label[inside] * count + values, return_counts=True)
+    owner, value = np.divmod(code, count)
+    most = np.zeros(keyframe.count, np.intp)
+    order = np.lexsort((pixels, owner))
+    most[owner[order]] = value[order]
+    return most

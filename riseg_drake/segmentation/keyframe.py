@@ -1,0 +1,114 @@
+"""The picture of the last rest, cut into superpixels: what every later frame is compared with."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.camera import Region, bounding_region
+from riseg_drake.geometry.rgbd import Frame, Immutable
+from riseg_drake.segmentation.above_table import AboveTable
+from riseg_drake.segmentation.alignment import EdgePixels, edge_pixels, has_contrast
+from riseg_drake.segmentation.noise import MeasurementNoise, gray_variance
+from riseg_drake.segmentation.superpixels import Superpixels, split_superpixels, superpixels
+from riseg_drake.segmentation.surface import SurfacePixels, surface_pixels
+
+_RIM = np.ones((5, 5), np.uint8)
+"""Two pixels on each side of an outline are blurred, interpolated across it, or without true depth."""
+
+
+@dataclass
+class KeyframeParameters:
+    """How finely a keyframe is looked at."""
+
+    superpixel: float = 0.006
+    """m on the object; size of the superpixels, each of which is taken to lie on one body."""
+    edge_pixels: int = 2000
+    """At most so many pixels with a gradient sharpen motions."""
+
+
+@dataclass(frozen=True)
+class Keyframe(Immutable):
+    """A frame cut into N superpixels."""
+
+    frame: Frame
+    above: AboveTable
+    region: Region
+    """The part of the view that is cut: all that stands there."""
+    superpixels: Superpixels
+    """Of the region."""
+    area: NDArray[np.intp]
+    """[N], pixels of each superpixel."""
+    witnesses: SurfacePixels
+    """The pixels that are asked: with depth, and not on the rim."""
+    owner: NDArray[np.intp]
+    """[W], superpixel of each witness."""
+    gray: NDArray[np.float32]
+    """[W], of each witness."""
+    variance: NDArray[np.float32]
+    """[W], of the difference between that and where it should reappear."""
+    edges: EdgePixels
+    """What sharpens motions; their `piece` is the superpixel."""
+
+    @property
+    def count(self) -> int:
+        """N."""
+        return self.superpixels.count
+
+    @property
+    def borders(self) -> NDArray[np.intp]:
+        """[M, 2], pairs of superpixels that touch."""
+        return self.superpixels.borders
+
+    @property
+    def length(self) -> NDArray[np.float64]:
+        """[M], of each border, in sides of a superpixel."""
+        return self.superpixels.length / max(
+            1.0, float(np.sqrt(np.median(self.area))) if len(self.area) else 1.0
+        )
+
+    @property
+    def pixels_per_metre(self) -> float:
+        """How large things appear, about, pixels a metre."""
+        return self.above.pixels_per_metre(self.frame.intrinsics)
+
+    def image_of(self, values: NDArray, outside: int = 0) -> NDArray:
+        """A value for each superpixel [N] as an image [H, W], `outside` where there is none."""
+        image = np.full(self.frame.depth.shape, outside, values.dtype)
+        label = self.superpixels.label
+        image[self.region] = np.append(values, np.array(outside, values.dtype))[label]
+        return image
+
+
+def make_keyframe(
+    frame: Frame,
+    above: AboveTable,
+    noise: MeasurementNoise,
+    parameters: KeyframeParameters,
+    bodies: NDArray[np.integer] | None = None,
+) -> Keyframe:
+    """Cut what stands on the table of a frame; known borders between bodies [H, W] cut, too."""
+    region = bounding_region(above.mask)
+    size = max(3, round(parameters.superpixel * above.pixels_per_metre(frame.intrinsics)))
+    cut = superpixels(frame.color[region], above.height[region], above.mask[region], size)
+    if bodies is not None:
+        cut = split_superpixels(cut, bodies[region], frame.color[region], above.height[region])
+    owner = np.full(above.mask.shape, -1, np.intp)
+    owner[region] = cut.label
+    variance = gray_variance(frame.gray, noise)
+    core = cv2.erode((owner >= 0).astype(np.uint8), _RIM, borderValue=0) > 0
+    witnesses = surface_pixels(core, frame.depth, frame.intrinsics)
+    v, u = witnesses.pixel
+    return Keyframe(
+        frame=frame,
+        above=above,
+        region=region,
+        superpixels=cut,
+        area=np.bincount(cut.label[cut.label >= 0], minlength=cut.count),
+        witnesses=witnesses,
+        owner=owner[v, u],
+        gray=frame.gray[v, u],
+        variance=variance[v, u],
+        edges=edge_pixels(frame, owner, has_contrast(variance, noise), variance, [], parameters.edge_pixels),
+    )

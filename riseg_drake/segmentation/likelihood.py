@@ -1,0 +1,94 @@
+"""How badly each rigid motion explains each superpixel, in nats: the one likelihood of this room.
+
+A point of the keyframe, moved, should reappear in the current frame with its gray value and its depth.
+Residuals are measured in standard deviations of their own noise; how large they really are, over all that is
+explained best, tells how far that noise is to be believed.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.geometry.se3 import inverse
+from riseg_drake.segmentation.keyframe import Keyframe
+from riseg_drake.segmentation.lighting import gray_costs
+from riseg_drake.segmentation.noise import depth_sigma
+from riseg_drake.segmentation.surface import seek
+
+EXPECTED = 2.0
+"""Squared residuals of gray and depth, both, where a motion is right."""
+
+
+@dataclass
+class LikelihoodParameters:
+    """What residuals are worth."""
+
+    residual_max: float = 9.0
+    """Squared normalised residuals of gray and of depth count no more than that each (highlights)."""
+    relit: float = 1.0
+    """What it adds to a pixel's squared residual if the light on its superpixel is taken to have changed."""
+    correlated_pixels: float = 6.0
+    """Noise of depth and gray is correlated over about so many pixels; they count as one."""
+    superpixel_max: float = 4.0
+    """Nats that one superpixel may say for a motion against another: its errors are its own."""
+
+
+@dataclass(frozen=True)
+class Costs:
+    """Of G motions for N superpixels."""
+
+    misfit: NDArray[np.float64]
+    """[G, N], mean squared residuals of each superpixel's witnesses: 2 where a motion is right, 18 at most."""
+    witnesses: NDArray[np.float64]
+    """[N], how many witnesses each superpixel has."""
+
+    def with_motion(self, other: "Costs") -> "Costs":
+        """These and other motions, for the same superpixels."""
+        return Costs(np.vstack([self.misfit, other.misfit]), self.witnesses)
+
+    def nats(self, parameters: LikelihoodParameters) -> NDArray[np.float64]:
+        """[G, N], how much worse than the best each motion is, by the noise that is there, bounded."""
+        asked = self.witnesses > parameters.correlated_pixels
+        best = self.misfit.min(0)
+        dispersion = max(1.0, float(np.median(best[asked])) / EXPECTED) if asked.any() else 1.0
+        worse = (self.misfit - best) * self.witnesses / (2 * parameters.correlated_pixels * dispersion)
+        return np.minimum(worse, parameters.superpixel_max)
+
+
+def motion_costs(
+    keyframe: Keyframe,
+    frame: Frame,
+    motions_K: NDArray[np.float64],
+    depth_noise: float,
+    parameters: LikelihoodParameters,
+) -> Costs:
+    """Costs of motions [G, 4, 4], given in the keyframe's camera K.
+
+    `depth_noise` is the standard deviation of depth at 1 m, m.
+    """
+    X_C1K = inverse(frame.X_WC) @ keyframe.frame.X_WC
+    gray_1, depth_1 = frame.unhidden_gray, frame.unhidden_depth
+    per_variance, ceiling = 1 / keyframe.variance, np.float32(parameters.residual_max)
+    witnesses = np.bincount(keyframe.owner, minlength=keyframe.count).astype(float)
+    misfit = np.full((len(motions_K), keyframe.count), EXPECTED)
+    for mean, motion in zip(misfit, motions_K, strict=True):
+        sought = seek(keyframe.witnesses, X_C1K @ motion)
+        z_1 = sought.read(depth_1)
+        photometric = gray_costs(
+            keyframe.gray,
+            sought.read_between(gray_1),
+            per_variance,
+            keyframe.owner,
+            keyframe.count,
+            parameters.residual_max,
+            parameters.relit,
+        )
+        sigma = depth_sigma(sought.depth, float(np.sqrt(2)) * depth_noise)
+        geometric = np.minimum(((z_1 - sought.depth) / sigma) ** 2, ceiling)
+        both = photometric + np.where(z_1 > 0, geometric, np.float32(1))
+        # What cannot be compared speaks neither for nor against: the value expected of a match.
+        total = np.bincount(keyframe.owner, np.where(np.isnan(both), EXPECTED, both), keyframe.count)
+        np.divide(total, witnesses, out=mean, where=witnesses > 0)
+    return Costs(misfit, witnesses)

@@ -1,0 +1,230 @@
+"""From rest to rest: how did that move which no known motion explains? Looked for, not tracked.
+
+Things that are pushed over a table slide and turn on it: three numbers, and a push is short. So all of them
+are tried on a grid, for a small patch of what is not explained, which mostly lies on one body; the best few
+are sharpened, on ever more of what they explain. Texture, outline and height all tell, so blank things are
+found, too.
+"""
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter
+
+from riseg_drake.geometry.camera import rays
+from riseg_drake.geometry.rgbd import Frame, FramePair
+from riseg_drake.geometry.se3 import inverse, skew
+from riseg_drake.segmentation.alignment import AlignmentParameters, rigid_fit
+from riseg_drake.segmentation.keyframe import Keyframe
+from riseg_drake.segmentation.likelihood import EXPECTED, Costs, LikelihoodParameters, motion_costs
+from riseg_drake.segmentation.partition import PartitionParameters, partition
+
+
+@dataclass
+class MotionSearchParameters:
+    """What is tried, and what is enough."""
+
+    reach: float = 0.044
+    """m; the farthest shift along each axis of the table."""
+    step: float = 0.004
+    """m, between two shifts: some pixels, within which a motion is sharpened."""
+    turn: float = 0.56
+    """rad; the largest turn."""
+    turn_step: float = 0.14
+    """rad, between two turns: a step at the rim of a patch."""
+    patch: float = 0.022
+    """m; radius of the patches."""
+    samples: int = 160
+    """Points of a patch that are asked."""
+    blur: float = 3.0
+    """Pixels; both images are blurred so much that a step of the grid leads into the right valley."""
+    best: int = 4
+    """Valleys that are gone down."""
+    unexplained: float = 4.0
+    """Mean squared residuals from which a superpixel is not explained."""
+    rounds: int = 24
+    """Patches that are tried at most."""
+    alignment: AlignmentParameters = field(
+        default_factory=lambda: AlignmentParameters(rounds=5, turn=0.1, shift=0.01)
+    )
+
+
+_GROWTH = (1.0, 1.4, 4.0, 50.0)
+"""Radii, in those of a patch, within which a motion is sharpened in turn."""
+
+
+def search_motions(
+    keyframe: Keyframe,
+    frame: Frame,
+    bond: NDArray[np.float64],
+    known_K: NDArray[np.float64],
+    depth_noise: float,
+    gain_min: float,
+    parameters: MotionSearchParameters,
+    likelihood: LikelihoodParameters,
+    parts: PartitionParameters,
+) -> NDArray[np.float64]:
+    """Motions [C, 4, 4] in the keyframe's camera that explain what standing still and the known ones do not.
+
+    Args:
+        keyframe: at the rest before.
+        frame: at the rest after.
+        bond: [M], log-odds of the keyframe's borders.
+        known_K: [G, 4, 4], motions that may explain some of it, the first of them standing still.
+        depth_noise: standard deviation of depth at 1 m, m.
+        gain_min: nats that a motion must bring.
+        parameters: see there.
+        likelihood: see there.
+        parts: what is large enough for a body.
+    """
+    search = _Search(keyframe, frame, depth_noise, parameters, likelihood)
+    costs = motion_costs(keyframe, frame, known_K, depth_noise, likelihood)
+    asked = costs.witnesses > likelihood.correlated_pixels
+    tried = np.zeros(keyframe.count, bool)
+    whole = partition(keyframe, bond, parts)
+    whole_tried = np.zeros(int(whole.max(initial=-1)) + 1, bool)
+    area_min = parts.area_min * keyframe.pixels_per_metre**2
+    found: list[NDArray] = []
+    for _ in range(parameters.rounds):
+        unexplained = (costs.misfit.min(0) > parameters.unexplained) & asked
+        patch, distance = search.densest_patch(unexplained & ~tried)
+        if keyframe.area[patch].sum() < 0.2 * area_min:
+            # Where edges alone are unexplained, the blank surface between them belongs to it.
+            share = np.bincount(whole, keyframe.area * unexplained, len(whole_tried)) * ~whole_tried
+            if not len(share) or share.max() < 0.3 * area_min:
+                break
+            patch = whole == share.argmax()
+            whole_tried[share.argmax()] = True
+            distance = np.where(patch, 0.0, np.inf)
+        tried |= patch & unexplained
+        best = search.best_motion(patch, distance, costs)
+        if best is not None and best[0] >= gain_min:
+            found.append(best[1])
+            costs = costs.with_motion(best[2])
+            # What it did not explain may be tried with other neighbours.
+            tried &= costs.misfit.min(0) > parameters.unexplained
+    return np.array(found).reshape(-1, 4, 4)
+
+
+class _Search:
+    """A keyframe and a frame, prepared for many motions."""
+
+    def __init__(
+        self,
+        keyframe: Keyframe,
+        frame: Frame,
+        depth_noise: float,
+        parameters: MotionSearchParameters,
+        likelihood: LikelihoodParameters,
+    ):
+        self._keyframe, self._frame, self._depth_noise = keyframe, frame, depth_noise
+        self._parameters, self._likelihood = parameters, likelihood
+        self._fit = rigid_fit(FramePair(keyframe.frame, frame), depth_noise)
+        self._gray_0, self._gray_1 = (self._blurred(f.gray) for f in (keyframe.frame, frame))
+        gradient = np.hypot(
+            *(cv2.Sobel(keyframe.frame.gray, cv2.CV_32F, *d, scale=0.125) for d in ((1, 0), (0, 1)))
+        )
+        self._variance = 8 + (0.5 * parameters.blur * self._blurred(gradient)) ** 2
+        self._rng = np.random.default_rng(keyframe.frame.sequence)
+        label = keyframe.image_of(np.arange(keyframe.count), -1)
+        v, u = np.nonzero(label >= 0)
+        middle = [np.bincount(label[v, u], x, keyframe.count) / np.maximum(keyframe.area, 1) for x in (v, u)]
+        self._middle = np.stack(middle, axis=1) / keyframe.pixels_per_metre
+        """[N, 2], m, of each superpixel, about."""
+        self._normal = keyframe.frame.X_WC[:3, :3].T @ keyframe.above.plane_W[:3]
+
+    def densest_patch(self, among: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+        """Of some superpixels [N] those around where most of them lie, and the distance [N] from there, m."""
+        index = np.flatnonzero(among)
+        if not len(index):
+            return among, np.full(len(among), np.inf)
+        middle, area = self._middle[index], self._keyframe.area[index]
+        squared = ((middle[:, None] - middle[None]) ** 2).sum(-1)
+        mass = np.exp(-squared / (0.55 * self._parameters.patch) ** 2) @ area
+        distance = np.linalg.norm(self._middle - middle[mass.argmax()], axis=1)
+        return among & (distance < self._parameters.patch), distance
+
+    def best_motion(
+        self, patch: NDArray[np.bool_], distance: NDArray[np.float64], costs: Costs
+    ) -> tuple[float, NDArray, Costs] | None:
+        """What a patch [N] did: the gain, nats, the motion [4, 4], and its costs."""
+        best_known = costs.misfit.min(0)
+        results = []
+        for start in self._valleys(patch):
+            motion = start
+            for radius in _GROWTH:
+                mine = self._costs(motion).misfit[0]
+                explained = (mine < self._parameters.unexplained + 1) & (mine < best_known - 0.3)
+                if radius == _GROWTH[0] or not np.isfinite(distance).all():
+                    explained |= patch
+                members = explained & (distance < radius * self._parameters.patch)
+                edges = np.flatnonzero(members[self._keyframe.edges.piece])
+                if len(edges) < 25:
+                    break
+                fitted, alignment = self._keyframe.edges.subset(edges), self._parameters.alignment
+                motion, _ = self._fit.align(fitted, motion, alignment.rounds, alignment)
+            own = self._costs(motion)
+            results.append((self._gain(own, best_known), motion, own))
+        return max(results, key=lambda result: result[0]) if results else None
+
+    def _gain(self, own: Costs, best_known: NDArray[np.float64]) -> float:
+        """Nats by which a motion explains better what it explains well."""
+        scale = own.witnesses / (2 * self._likelihood.correlated_pixels)
+        better = np.clip((best_known - own.misfit[0]) * scale, 0, self._likelihood.superpixel_max)
+        return float(better[own.misfit[0] < self._parameters.unexplained + 1].sum())
+
+    def _costs(self, motion: NDArray) -> Costs:
+        return motion_costs(self._keyframe, self._frame, motion[None], self._depth_noise, self._likelihood)
+
+    def _valleys(self, patch: NDArray[np.bool_]) -> list[NDArray]:
+        """The best motions [4, 4] on the grid of slides and turns."""
+        parameters, keyframe = self._parameters, self._keyframe
+        witness = np.flatnonzero(patch[keyframe.owner])
+        if len(witness) < parameters.samples // 3:
+            return []
+        witness = np.sort(self._rng.permutation(witness)[: parameters.samples])
+        v, u = keyframe.witnesses.pixel[:, witness]
+        p_KQ = rays(self._frame.intrinsics)[v, u] * keyframe.witnesses.depth[witness, None]
+        shifts = np.arange(-parameters.reach, parameters.reach + 1e-9, parameters.step)
+        turns = np.arange(-parameters.turn, parameters.turn + 1e-9, parameters.turn_step)
+        grid = np.stack(np.meshgrid(shifts, shifts, turns, indexing="ij"), axis=-1)
+        motions = slides(self._normal, p_KQ.mean(0), grid.reshape(-1, 3))
+        cost = self._mean_costs(p_KQ, self._gray_0[v, u], self._variance[v, u], motions).reshape(grid.shape[:3])
+        lowest = np.flatnonzero((cost == minimum_filter(cost, 5)).ravel())
+        order = lowest[np.argsort(cost.ravel()[lowest])][: parameters.best]
+        return list(motions[order])
+
+    def _mean_costs(self, p_KQ: NDArray, gray: NDArray, variance: NDArray, motions: NDArray) -> NDArray:
+        """Mean squared residuals [H] under motions [H, 4, 4] of S points with gray values and variances."""
+        k, frame = self._frame.intrinsics, self._frame
+        X = (inverse(frame.X_WC) @ self._keyframe.frame.X_WC @ motions).astype(np.float32)
+        p_C1Q = np.einsum("hij,nj->hni", X[:, :3, :3], p_KQ.astype(np.float32)) + X[:, None, :3, 3]
+        z = p_C1Q[..., 2]
+        u, v = k.fx * p_C1Q[..., 0] / z + np.float32(k.cx), k.fy * p_C1Q[..., 1] / z + np.float32(k.cy)
+        found = cv2.remap(self._gray_1, u, v, cv2.INTER_LINEAR, borderValue=0)
+        z_1 = cv2.remap(frame.unhidden_depth, u, v, cv2.INTER_NEAREST, borderValue=0)
+        most = self._likelihood.residual_max
+        cost = np.minimum((found - gray) ** 2 / variance, most)
+        sigma = np.float32(2 * np.sqrt(2) * self._depth_noise) * z**2
+        cost += np.where(z_1 > 0, np.minimum(((z_1 - z) / sigma) ** 2, most), EXPECTED / 2)
+        return cost.mean(1)
+
+    def _blurred(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
+        return cv2.GaussianBlur(image, (0, 0), self._parameters.blur)
+
+
+def slides(normal: NDArray, centre: NDArray, amounts: NDArray) -> NDArray[np.float64]:
+    """Motions [H, 4, 4] of things on a plane: shifted along it by two of `amounts` [H, 3], m, and turned about
+    its normal [3] through a centre [3] by the third, rad."""
+    n = normal / np.linalg.norm(normal)
+    first = np.cross(n, np.eye(3)[np.abs(n).argmin()])
+    first /= np.linalg.norm(first)
+    along = np.stack([first, np.cross(n, first)])
+    K = skew(n)
+    sine, cosine = np.sin(amounts[:, 2, None, None]), np.cos(amounts[:, 2, None, None])
+    X = np.tile(np.eye(4), (len(amounts), 1, 1))
+    X[:, :3, :3] += sine * K + (1 - cosine) * (K @ K)
+    X[:, :3, 3] = centre - X[:, :3, :3] @ centre + amounts[:, :2] @ along
+    return X

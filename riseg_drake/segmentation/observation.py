@@ -1,0 +1,151 @@
+"""What one frame says of a keyframe: which motion each superpixel has, and which neighbours moved as one.
+
+For a motion k of the share pi_k of what stands there, and superpixels a, b that have it with the
+probabilities q_a(k) and q_b(k), being one body or not makes the two motions agree always, or by chance:
+
+    evidence(a, b) = log( sum_k q_a(k) q_b(k) / pi_k )
+
+Standing still together says little, sharing a rare motion says much, moving apart says most.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
+from riseg_drake.segmentation.alignment import AlignmentParameters, align_motions
+from riseg_drake.segmentation.keyframe import Keyframe
+from riseg_drake.segmentation.likelihood import Costs, LikelihoodParameters, motion_costs
+from riseg_drake.segmentation.motions import flow_difference
+from riseg_drake.segmentation.potts import PottsGraph, potts_labels
+
+
+@dataclass
+class ObservationParameters:
+    """How motions are given to superpixels."""
+
+    likelihood: LikelihoodParameters = field(default_factory=LikelihoodParameters)
+    alignment: AlignmentParameters = field(default_factory=AlignmentParameters)
+    outlier: float = 0.02
+    """Probability with which a superpixel's motion says nothing of its body."""
+    motion_cost: float = 12.0
+    """Nats that a motion must explain better than all others do, to be one: three superpixels' worth."""
+    still_share: float = 0.5
+    """Least share of standing still: most does."""
+    still: float = 0.5
+    """Nats by which a superpixel that says nothing stands still rather than moves."""
+    border: float = 1.0
+    """Share of a border's log-odds by which unequal motions on both sides are less likely."""
+    border_least: float = 0.2
+    """Nats of a border that is none in the image, as of one that is known to be one."""
+
+
+@dataclass(frozen=True)
+class Observation(Immutable):
+    """Of N superpixels and M borders of a keyframe, at one frame."""
+
+    motions_K: NDArray[np.float64]
+    """[G, 4, 4] since the keyframe, seen from its camera; the first is standing still."""
+    motion: NDArray[np.intp]
+    """[N], which of them each superpixel has."""
+    costs: Costs
+    """Of these motions."""
+    evidence: NDArray[np.float64]
+    """[M], log-odds that both sides of a border are one body."""
+    moved: NDArray[np.float64]
+    """[N], log-odds of having moved."""
+    span: NDArray[np.float64]
+    """[N], pixels by which its motion moves a superpixel: how well it tells motions apart."""
+
+
+def observe(
+    keyframe: Keyframe,
+    frame: Frame,
+    bond: NDArray[np.float64],
+    candidates_K: NDArray[np.float64],
+    depth_noise: float,
+    parameters: ObservationParameters,
+) -> Observation:
+    """Explain a frame by standing still and some of the candidate motions.
+
+    Args:
+        keyframe: what to explain.
+        frame: the frame.
+        bond: [M], log-odds of each border so far.
+        candidates_K: [C, 4, 4], motions since the keyframe, seen from its camera.
+        depth_noise: standard deviation of depth at 1 m, m.
+        parameters: see there.
+    """
+    candidates_K = candidates_K.reshape(-1, 4, 4)
+    if len(candidates_K):
+        pair = FramePair(keyframe.frame, frame)
+        candidates_K = align_motions(pair, keyframe.edges, candidates_K, depth_noise, parameters.alignment)
+    motions_K = np.concatenate([np.eye(4)[None], candidates_K])
+    costs = motion_costs(keyframe, frame, motions_K, depth_noise, parameters.likelihood)
+    nats = costs.nats(parameters.likelihood)
+    needed, motion = _fewest_motions(nats, keyframe, bond, parameters)
+    nats = nats[needed]
+    share = np.bincount(motion, keyframe.area, len(needed)) / max(1, keyframe.area.sum())
+    share = np.maximum(share, parameters.outlier)
+    share[0] = max(share[0], parameters.still_share)
+    share /= share.sum()
+    q = motion_posterior(nats, share, parameters.outlier)
+    moved = np.zeros(keyframe.count)
+    if len(needed) > 1:
+        moved = nats[0] - nats[1:].min(0) - 0.5 * parameters.likelihood.superpixel_max
+    focal_length, p_KQ = frame.intrinsics.fx, keyframe.edges.p_C0Q[::10]
+    spans = [flow_difference(p_KQ, X, np.eye(4), focal_length) if len(p_KQ) else 0.0 for X in motions_K[needed]]
+    return Observation(
+        motions_K=motions_K[needed],
+        motion=motion,
+        costs=Costs(costs.misfit[needed], costs.witnesses),
+        evidence=bond_evidence(q, share, keyframe.borders),
+        moved=moved,
+        span=np.array(spans)[motion],
+    )
+
+
+def motion_posterior(
+    nats: NDArray[np.float64], share: NDArray[np.float64], outlier: float
+) -> NDArray[np.float64]:
+    """q [G, N]: how likely each motion is a superpixel's own, by costs [G, N] and how common each is [G].
+
+    A superpixel may be an `outlier`, with that probability, whose costs say nothing.
+    """
+    logit = np.log(share)[:, None] - nats
+    q = np.exp(logit - logit.max(0))
+    return (1 - outlier) * q / q.sum(0) + outlier * share[:, None]
+
+
+def bond_evidence(
+    q: NDArray[np.float64], share: NDArray[np.float64], borders: NDArray[np.intp]
+) -> NDArray[np.float64]:
+    """[M], log-odds that both sides of borders [M, 2] are one body: log sum_k q_a(k) q_b(k) / pi_k."""
+    a, b = borders.T
+    return np.log((q[:, a] * q[:, b] / share[:, None]).sum(0))
+
+
+def _fewest_motions(
+    nats: NDArray[np.float64],
+    keyframe: Keyframe,
+    bond: NDArray[np.float64],
+    parameters: ObservationParameters,
+) -> tuple[list[int], NDArray[np.intp]]:
+    """The motions that are needed, and which of these each superpixel [N] has; drops the others one by one."""
+    coupling = parameters.border * np.maximum(bond, parameters.border_least) * keyframe.length
+    graph = PottsGraph(keyframe.count, keyframe.borders, coupling)
+    needed, message = list(range(len(nats))), None
+    while True:
+        unary = nats[needed].astype(np.float32)
+        unary[1:] += np.float32(parameters.still)
+        motion, message = potts_labels(unary, graph, message)
+        gains = []
+        for k in range(1, len(needed)):
+            mine = nats[np.ix_(needed, motion == k)].sum(1)
+            gains.append(float(np.delete(mine, k).min() - mine[k]))
+        if not gains or min(gains) >= parameters.motion_cost:
+            return needed, motion
+        dropped = int(np.argmin(gains)) + 1
+        del needed[dropped]
+        message = np.delete(message, dropped, axis=0)

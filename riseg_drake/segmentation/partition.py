@@ -1,0 +1,135 @@
+"""Which superpixels are one body, which bodies have moved, and what the next best answer would cost."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.segmentation.keyframe import Keyframe
+from riseg_drake.segmentation.multicut import multicut
+
+
+@dataclass
+class PartitionParameters:
+    """What counts as a body."""
+
+    area_min: float = 3.0e-4
+    """m^2; what is smaller is no object of its own."""
+    moved_min: float = 8.0
+    """Nats by which the superpixels of a body together must say that it has moved: two superpixels' worth."""
+    margins: tuple[float, ...] = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0)
+    """Log-odds by which every bond is weakened, and strengthened, to see which bodies fall apart or merge."""
+
+
+def partition(
+    keyframe: Keyframe, bond: NDArray[np.float64], parameters: PartitionParameters
+) -> NDArray[np.intp]:
+    """The part 0.. of each superpixel [N] for the log-odds of each border [M]; no part is too small."""
+    weight = bond * keyframe.length
+    part = multicut(keyframe.count, keyframe.borders, weight)
+    return _without_small(
+        part, keyframe.borders, weight, keyframe.area, parameters.area_min * keyframe.pixels_per_metre**2
+    )
+
+
+def moved_parts(
+    part: NDArray[np.intp], moved: NDArray[np.float64], parameters: PartitionParameters
+) -> NDArray[np.bool_]:
+    """Which parts [P] have moved, by the log-odds of their superpixels [N]."""
+    return np.bincount(part, moved) > parameters.moved_min
+
+
+def with_ids(
+    part: NDArray[np.intp],
+    moved: NDArray[np.bool_],
+    area: NDArray[np.intp],
+    previous: Sequence[NDArray[np.intp]],
+    next_id: int,
+) -> tuple[NDArray[np.intp], int]:
+    """Ids [N] (0 = has not moved), and the next free one: the larger part of what was one keeps its id.
+
+    Args:
+        part: [N], part of each superpixel.
+        moved: [P], of each part.
+        area: [N].
+        previous: ids [N] to keep, the most binding first.
+        next_id: the first that is free.
+    """
+    id_of = np.zeros(len(moved), np.intp)
+    for ids in previous:
+        known = (ids > 0) & moved[part] & (id_of[part] == 0) & ~np.isin(ids, id_of)
+        pairs, inverse = np.unique(np.stack([part[known], ids[known]]), axis=1, return_inverse=True)
+        shared = np.bincount(inverse.ravel(), area[known], pairs.shape[1])
+        for p, a in pairs[:, np.argsort(-shared, kind="stable")].T:
+            if id_of[p] == 0 and a not in id_of:
+                id_of[p] = a
+    fresh = np.flatnonzero(moved & (id_of == 0))
+    id_of[fresh] = next_id + np.arange(len(fresh))
+    return id_of[part], max(next_id, int(id_of.max(initial=0)) + 1)
+
+
+def margins(
+    keyframe: Keyframe,
+    bond: NDArray[np.float64],
+    body: NDArray[np.intp],
+    parameters: PartitionParameters,
+) -> dict[int, float]:
+    """For each id in `body` [N], by how many nats a border its best partition is better than the next one.
+
+    A body that falls in two when every bond is a little weaker, or merges with another that moved when every
+    bond is a little stronger, is in doubt.
+    """
+    ids = [int(a) for a in np.unique(body[body > 0])]
+    margin = dict.fromkeys(ids, 2 * parameters.margins[-1])
+    for by in reversed(parameters.margins):
+        weaker = partition(keyframe, bond - by, parameters)
+        stronger = partition(keyframe, bond + by, parameters)
+        for a in ids:
+            mine = body == a
+            shares = np.bincount(weaker[mine], keyframe.area[mine])
+            falls_apart = np.count_nonzero(shares >= parameters.area_min * keyframe.pixels_per_metre**2) > 1
+            own = np.bincount(stronger[mine], keyframe.area[mine]).argmax()
+            others = (stronger == own) & ~mine & (body > 0)
+            merges = keyframe.area[others].sum() >= parameters.area_min * keyframe.pixels_per_metre**2
+            if falls_apart or merges:
+                margin[a] = by
+    return margin
+
+
+def _without_small(
+    part: NDArray[np.intp],
+    borders: NDArray[np.intp],
+    weight: NDArray[np.float64],
+    area: NDArray[np.intp],
+    area_min: float,
+) -> NDArray[np.intp]:
+    """The parts, those smaller than `area_min` pixels joined to the neighbour they are bound to most."""
+    count = int(part.max(initial=-1)) + 1
+    size = np.bincount(part, area, count)
+    if count == 0 or (size >= area_min).all():
+        return part
+    a, b = part[borders].T
+    outer = a != b
+    bonds: list[dict[int, float]] = [{} for _ in range(count)]
+    for i, j, w in zip(a[outer].tolist(), b[outer].tolist(), weight[outer].tolist(), strict=True):
+        bonds[i][j] = bonds[j][i] = bonds[i].get(j, 0.0) + w
+    parent = np.arange(count)
+    queue = sorted(np.flatnonzero(size < area_min).tolist(), key=lambda p: size[p])
+    while queue:
+        small = queue.pop(0)
+        if parent[small] != small or size[small] >= area_min or not bonds[small]:
+            continue
+        into = max(bonds[small], key=lambda p: bonds[small][p])
+        parent[small] = into
+        size[into] += size[small]
+        for p, w in bonds[small].items():
+            del bonds[p][small]
+            if p != into:
+                bonds[into][p] = bonds[p][into] = bonds[into].get(p, 0.0) + w
+        bonds[small] = {}
+        if size[into] < area_min:
+            queue.append(into)
+    while not np.array_equal(parent, parent[parent]):
+        parent = parent[parent]
+    return np.unique(parent[part], return_inverse=True)[1]

@@ -1,0 +1,277 @@
+"""Line 7 of Alg. 2 by one model of evidence, in place of rules: in trial, see docs/paper.md.
+
+Frames are compared with a keyframe, the picture of the last rest. While something moves, the motions of lines
+3 to 6 are chained to what each body has done since then, and carry the mask along. At the next rest both
+pictures are sharp, have depth, and span all that happened: that pair decides, its evidence is kept, and its
+second frame becomes the keyframe.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.camera import rays
+from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
+from riseg_drake.geometry.se3 import inverse, move_points
+from riseg_drake.segmentation.above_table import AboveTable
+from riseg_drake.segmentation.association import UNKNOWN
+from riseg_drake.segmentation.belief import (
+    Belief,
+    BeliefParameters,
+    Bodies,
+    bodies_of,
+    carry_bodies,
+    first_belief,
+    next_belief,
+    standing,
+)
+from riseg_drake.segmentation.bfif import BFIFParameters
+from riseg_drake.segmentation.candidates import candidate_motions
+from riseg_drake.segmentation.memory import Memory, draw_memory, moved_memory, remember
+from riseg_drake.segmentation.motion_search import MotionSearchParameters, search_motions
+from riseg_drake.segmentation.motions import BFIFGroups
+from riseg_drake.segmentation.observation import Observation, ObservationParameters, observe
+from riseg_drake.segmentation.partition import margins
+from riseg_drake.segmentation.propagation import pixels_of
+from riseg_drake.segmentation.rest import RestParameters, is_still
+
+
+@dataclass
+class EvidenceParameters:
+    """How line 7 is decided by evidence (not in the paper)."""
+
+    rest: RestParameters = field(default_factory=RestParameters)
+    observation: ObservationParameters = field(default_factory=ObservationParameters)
+    search: MotionSearchParameters = field(default_factory=MotionSearchParameters)
+    belief: BeliefParameters = field(default_factory=BeliefParameters)
+    settled: float = 2.0
+    """Nats a border by which an object's outline must be better than the next best, not to be in doubt."""
+    uncovered: float = 0.3
+    """Share of what stands there that the keyframe does not show, from which the view needs another."""
+    memory: bool = True
+    """Remember objects that leave the view (not in the paper)."""
+
+
+@dataclass(frozen=True)
+class EvidentSegmentation(Immutable):
+    """L_t, and what must be remembered for L_t+1: the propagator's one state."""
+
+    sequence: int
+    """Number of the frame that `label` belongs to; -1 before the first."""
+    label: NDArray[np.uint16]
+    """[H, W], ids, UNKNOWN where something stands that has not moved yet, 0 for table and robot."""
+    margin: Mapping[int, float] = field(default_factory=dict)
+    """For each id, by how many nats a border the partition is better than the next best one."""
+    settled: float = 0.0
+    """The margin that leaves no doubt."""
+    belief: Belief | None = None
+    """As of the keyframe; None before anything stood on the table."""
+    bodies: Mapping[int, Bodies] = field(default_factory=dict)
+    """By frame number, since the pair's reference: the bodies, and how they moved since the keyframe."""
+    frame: Frame | None = None
+    """The last one."""
+    still_since: float | None = None
+    """s; None while something moves."""
+    decided: bool = True
+    """Whether the present rest has been looked at."""
+    memory: Memory = field(default_factory=dict)
+    """Points of objects that the keyframe does not see, as of its time."""
+
+    @property
+    def mask(self) -> NDArray[np.uint16]:
+        """L_t [H, W]: object ids, 0 = background."""
+        return np.where(self.label == UNKNOWN, np.uint16(0), self.label)
+
+    @property
+    def settled_mask(self) -> NDArray[np.uint16]:
+        """L_t [H, W] without the objects in doubt: what needs no further push."""
+        doubtful = [a for a, margin in self.margin.items() if margin < self.settled]
+        mask = self.mask
+        return np.where(np.isin(mask, doubtful), np.uint16(0), mask) if doubtful else mask
+
+    @property
+    def confidence(self) -> dict[int, float]:
+        """For each id the probability, by the margin, that it is one object and all of it."""
+        return {a: float(1 / (1 + np.exp(self.settled - 2 * margin))) for a, margin in self.margin.items()}
+
+    @property
+    def object_ids(self) -> tuple[int, ...]:
+        """All ids that are held now, in the view or not."""
+        ids = set(self.memory)
+        if self.belief is not None:
+            newest = self.bodies[max(self.bodies)].body if self.bodies else self.belief.body
+            ids |= set(np.unique(newest[newest > 0]).tolist())
+        return tuple(sorted(int(a) for a in ids))
+
+
+def nothing_evident(shape: tuple[int, int]) -> EvidentSegmentation:
+    """L_0: an empty mask [H, W] (Alg. 1, line 3)."""
+    return EvidentSegmentation(sequence=-1, label=np.zeros(shape, np.uint16))
+
+
+def segment_by_evidence(
+    before: EvidentSegmentation,
+    pair: FramePair,
+    groups: BFIFGroups,
+    above_0: AboveTable,
+    above_1: AboveTable,
+    parameters: EvidenceParameters,
+    bfif: BFIFParameters,
+) -> EvidentSegmentation:
+    """L_t from G_t and L_t-1.
+
+    Args:
+        before: L_t-1; if it already belongs to this pair's frame it is the answer.
+        pair: the frames of t-1 and t.
+        groups: G_t.
+        above_0: objMask at t-1.
+        above_1: objMask at t.
+        parameters: see there.
+        bfif: what the groups were made with: noise of the measurements, and when two motions are one.
+    """
+    frame = pair.current
+    if before.sequence == frame.sequence:
+        return before
+    if before.belief is None:
+        return _begin(before, frame, above_1, parameters, bfif)
+    now = _with_rest(before, frame, above_1, parameters, bfif)
+    belief, bodies = now.belief, _bodies_before(now)
+    assert belief is not None
+    candidates_K = candidate_motions(
+        belief.keyframe,
+        pair.reference,
+        groups,
+        before.bodies.get(pair.reference.sequence, standing(belief)),
+        bodies.motions_K[1:],
+        bfif.motions.merge_flow,
+    )
+    seen: Observation | None = None
+    deciding = (
+        now.still_since is not None
+        and not now.decided
+        and (frame.time - now.still_since >= parameters.rest.time)
+    )
+    depth_noise = max(above_1.depth_noise, belief.keyframe.above.depth_noise)
+    if deciding:
+        candidates_K = np.concatenate(
+            [candidates_K, _searched(belief, frame, candidates_K, depth_noise, parameters)]
+        )
+    if len(candidates_K):
+        seen = observe(belief.keyframe, frame, belief.bond, candidates_K, depth_noise, parameters.observation)
+        bodies = bodies_of(belief, seen, bodies, parameters.belief)
+    return _carried(now, pair, above_1, seen, bodies, deciding, parameters, bfif)
+
+
+def _begin(
+    before: EvidentSegmentation,
+    frame: Frame,
+    above: AboveTable,
+    parameters: EvidenceParameters,
+    bfif: BFIFParameters,
+) -> EvidentSegmentation:
+    """The first keyframe, once something stands on the table."""
+    label = np.where(above.mask, UNKNOWN, np.uint16(0))
+    belief = first_belief(frame, above, bfif.noise, parameters.belief) if above.mask.any() else None
+    return replace(
+        before, sequence=frame.sequence, label=label, belief=belief, frame=frame, settled=parameters.settled
+    )
+
+
+def _with_rest(
+    before: EvidentSegmentation,
+    frame: Frame,
+    above: AboveTable,
+    parameters: EvidenceParameters,
+    bfif: BFIFParameters,
+) -> EvidentSegmentation:
+    """Whether anything moves, from the last frame to this one."""
+    assert before.frame is not None
+    if not is_still(before.frame, frame, above, bfif.noise, parameters.rest):
+        return replace(before, still_since=None, decided=False)
+    return replace(before, still_since=frame.time) if before.still_since is None else before
+
+
+def _bodies_before(now: EvidentSegmentation) -> Bodies:
+    assert now.belief is not None
+    return now.bodies[max(now.bodies)] if now.bodies else standing(now.belief)
+
+
+def _searched(
+    belief: Belief,
+    frame: Frame,
+    candidates_K: NDArray[np.float64],
+    depth_noise: float,
+    parameters: EvidenceParameters,
+) -> NDArray[np.float64]:
+    return search_motions(
+        belief.keyframe,
+        frame,
+        belief.bond,
+        np.concatenate([np.eye(4)[None], candidates_K]),
+        depth_noise,
+        parameters.observation.motion_cost,
+        parameters.search,
+        parameters.observation.likelihood,
+        parameters.belief.partition,
+    )
+
+
+def _carried(
+    now: EvidentSegmentation,
+    pair: FramePair,
+    above: AboveTable,
+    seen: Observation | None,
+    bodies: Bodies,
+    deciding: bool,
+    parameters: EvidenceParameters,
+    bfif: BFIFParameters,
+) -> EvidentSegmentation:
+    """The mask in the view of t, and a new keyframe where it is time for one."""
+    belief, frame = now.belief, pair.current
+    assert belief is not None
+    X_WK = belief.keyframe.frame.X_WC
+    moves = {
+        int(a): bodies.motions_K[bodies.motion[bodies.body == a][0]]
+        for a in np.unique(bodies.body[(bodies.body > 0) & (bodies.motion > 0)])
+    }
+    remembered = draw_memory(moved_memory(now.memory, moves, X_WK), frame)
+    label = carry_bodies(belief, bodies, frame, above, remembered)
+    kept = {s: b for s, b in now.bodies.items() if s >= pair.reference.sequence}
+    now = replace(
+        now, sequence=frame.sequence, label=label, frame=frame, bodies={**kept, frame.sequence: bodies}
+    )
+    margin = now.margin
+    if deciding and seen is not None:
+        margin = margins(belief.keyframe, belief.bond + seen.evidence, bodies.body, parameters.belief.partition)
+    moved = deciding and len(bodies.motions_K) > 1
+    if not above.mask.any() or not (moved or _leaves_keyframe(belief, bodies, frame, above, parameters)):
+        return replace(now, margin=margin, decided=now.decided or deciding)
+    memory: Memory = {}
+    if parameters.memory:
+        label_K = belief.keyframe.image_of(bodies.body.astype(np.uint16))
+        memory = remember(now.memory, FramePair(belief.keyframe.frame, frame), label_K, moves)
+    following = next_belief(belief, seen, bodies, frame, above, remembered, bfif.noise, parameters.belief)
+    return replace(
+        now, margin=margin, belief=following, bodies={}, memory=memory, decided=now.decided or deciding
+    )
+
+
+def _leaves_keyframe(
+    belief: Belief, bodies: Bodies, frame: Frame, above: AboveTable, parameters: EvidenceParameters
+) -> bool:
+    """Whether too much of what stands there was not to be seen in the keyframe."""
+    every = (slice(2, None, 6), slice(2, None, 6))
+    standing_there = above.mask[every] & (frame.depth[every] > 0)
+    if not standing_there.any():
+        return False
+    p_C1Q = (rays(frame.intrinsics)[every] * frame.depth[every][..., None])[standing_there].astype(float)
+    p_KQ = move_points(inverse(belief.keyframe.frame.X_WC) @ frame.X_WC, p_C1Q)
+    known = cv2.dilate(belief.keyframe.above.mask.view(np.uint8), np.ones((9, 9), np.uint8))
+    covered = np.zeros(len(p_KQ), bool)
+    for X in bodies.motions_K:
+        (v, u), inside = (a.T for a in pixels_of(move_points(inverse(X), p_KQ), frame.intrinsics))
+        covered[inside] |= known[v[inside], u[inside]] > 0
+    return bool(np.mean(~covered) > parameters.uncovered)

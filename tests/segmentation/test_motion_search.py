@@ -1,0 +1,130 @@
+"""From rest to rest: motions that nobody proposed are found."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform, RotationMatrix
+
+from riseg_drake.segmentation.belief import BeliefParameters, first_belief
+from riseg_drake.segmentation.motion_search import MotionSearchParameters, search_motions, slides
+from riseg_drake.segmentation.motions import flow_difference
+from riseg_drake.segmentation.noise import MeasurementNoise
+from riseg_drake.segmentation.observation import ObservationParameters, observe
+from tests.segmentation.drawn_scene import (
+    Blank,
+    DrawnScene,
+    Texture,
+    looking_down,
+    motion_seen_from,
+    planar,
+    standing,
+)
+
+SIZES = [(0.08, 0.07, 0.03), (0.06, 0.08, 0.05), (0.05, 0.05, 0.04)]
+PLACES = [planar(-0.07, 0.0), planar(0.0, 0.0), planar(0.055, 0.01)]
+OVER = looking_down()
+DEPTH_NOISE = 0.0023
+
+
+def test_slides_are_turns_about_the_normal_through_the_centre_and_shifts_along_the_plane():
+    normal, centre = np.array([0.0, -0.6, -0.8]), np.array([0.1, 0.2, 0.5])
+    amounts = np.array([[0.01, -0.02, 0.3], [0.0, 0.0, 0.0], [0.03, 0.0, 0.0]])
+    motions = slides(normal, centre, amounts)
+    np.testing.assert_allclose(motions[1], np.eye(4), atol=1e-15)
+    for X, (first, second, turn) in zip(motions, amounts, strict=True):
+        moved = RigidTransform(X)
+        assert moved.rotation().ToAngleAxis().angle() == pytest.approx(abs(turn))
+        if turn:
+            np.testing.assert_allclose(moved.rotation().ToAngleAxis().axis(), normal, atol=1e-9)
+        shift = moved.multiply(centre) - centre
+        assert shift @ normal == pytest.approx(0)
+        assert np.linalg.norm(shift) == pytest.approx(np.hypot(first, second))
+        assert RotationMatrix(X[:3, :3]).IsValid()
+
+
+class Moved:
+    """Boxes before and after some of them have moved, with sensor noise."""
+
+    def __init__(self, after: dict[int, tuple[float, float, float]], textures: list | None = None):
+        scene = DrawnScene(SIZES, textures=textures or [])
+        poses = [planar(*after[k]) if k in after else X for k, X in enumerate(PLACES)]
+        pair, self.label, _ = scene.pair((OVER, OVER), (PLACES, poses), np.random.default_rng(0))
+        self.frame = pair.current
+        above = standing(pair.reference, self.label > 0)
+        self.belief = first_belief(pair.reference, above, MeasurementNoise(), BeliefParameters())
+        self.motions_K = {k: motion_seen_from(OVER, PLACES[k], poses[k]) for k in after}
+
+    def search(self, known: np.ndarray | None = None) -> np.ndarray:
+        parameters = ObservationParameters()
+        known = np.eye(4)[None] if known is None else known
+        return search_motions(
+            self.belief.keyframe,
+            self.frame,
+            self.belief.bond,
+            known,
+            DEPTH_NOISE,
+            parameters.motion_cost,
+            MotionSearchParameters(),
+            parameters.likelihood,
+            BeliefParameters().partition,
+        )
+
+    def error(self, k: int, found: np.ndarray) -> float:
+        """Pixels by which the nearest found motion is wrong on a box."""
+        edges = self.belief.keyframe.edges
+        v, u = edges.surface.pixel
+        p_KQ = edges.p_C0Q[self.label[v, u] == k + 1]
+        return min(flow_difference(p_KQ, X, self.motions_K[k], 308.1) for X in found)
+
+
+FAR = {0: (-0.085, 0.018, 0.25), 2: (0.07, 0.04, -0.2)}
+
+
+@pytest.mark.renders
+def test_two_boxes_that_went_far_and_turned_are_both_found():
+    moved = Moved(FAR)
+    found = moved.search()
+    assert moved.error(0, found) < 0.3
+    assert moved.error(2, found) < 0.3
+
+
+@pytest.mark.renders
+def test_a_blank_box_is_found_by_its_outline_and_height():
+    moved = Moved({0: (-0.085, 0.018, 0.25)}, [Blank(90.0), Texture(1), Texture(2)])
+    assert moved.error(0, moved.search()) < 0.6
+
+
+@pytest.mark.renders
+def test_where_nothing_moved_nothing_is_found():
+    assert len(Moved({}).search()) == 0
+
+
+@pytest.mark.renders
+def test_what_a_known_motion_explains_is_not_searched_again():
+    moved = Moved(FAR)
+    known = np.array([np.eye(4), *moved.motions_K.values()])
+    assert len(moved.search(known)) == 0
+
+
+@pytest.mark.renders
+def test_boxes_get_their_motions_and_borders_inside_them_hold():
+    moved = Moved(FAR)
+    keyframe = moved.belief.keyframe
+    seen = observe(
+        keyframe, moved.frame, moved.belief.bond, moved.search(), DEPTH_NOISE, ObservationParameters()
+    )
+    truth = np.array(
+        [
+            np.bincount(moved.label[keyframe.image_of(np.arange(keyframe.count), -1) == s]).argmax()
+            for s in range(keyframe.count)
+        ]
+    )
+    assert len(seen.motions_K) == 3
+    for k in (1, 2, 3):
+        motions = seen.motion[truth == k]
+        assert np.mean(motions == np.bincount(motions).argmax()) > 0.97
+    a, b = keyframe.borders.T
+    apart = truth[a] != truth[b]
+    assert np.median(seen.evidence[apart]) < -1.5
+    # The rarer a motion, the more sharing it says: the third box is the smaller of the two that moved.
+    shared = [np.median(seen.evidence[~apart & (truth[a] == k)]) for k in (1, 2, 3)]
+    assert 0 < shared[1] < shared[0] < shared[2]

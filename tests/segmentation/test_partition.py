@@ -1,0 +1,105 @@
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from riseg_drake.segmentation.partition import (
+    PartitionParameters,
+    margins,
+    moved_parts,
+    partition,
+    with_ids,
+)
+
+
+@dataclass
+class Row:
+    """Five superpixels in a row, 10 pixels each; an object has at least `least` pixels."""
+
+    least: int = 10
+    count: int = 5
+    borders: np.ndarray = field(default_factory=lambda: np.array([[0, 1], [1, 2], [2, 3], [3, 4]]))
+    length: np.ndarray = field(default_factory=lambda: np.ones(4))
+    area: np.ndarray = field(default_factory=lambda: np.full(5, 10))
+
+    @property
+    def pixels_per_metre(self) -> float:
+        return float(np.sqrt(self.least / PartitionParameters().area_min))
+
+
+def test_a_border_counts_by_its_length():
+    row = Row()
+    row.borders = np.array([[0, 1], [0, 2], [1, 2], [3, 4]])
+    row.length = np.array([1.0, 3.0, 1.0, 1.0])
+    # 2 is bound to 1 by 1 and held off 0 by 3 x 0.4: together they lose 0.2.
+    part = partition(row, np.array([2.0, -0.4, 1.0, 1.0]), PartitionParameters())
+    np.testing.assert_array_equal(part, [0, 0, 1, 2, 2])
+
+
+def test_what_is_too_small_joins_the_neighbour_it_is_bound_to_most():
+    bond = np.array([3.0, -2.0, -1.0, 3.0])
+    np.testing.assert_array_equal(partition(Row(least=10), bond, PartitionParameters()), [0, 0, 1, 2, 2])
+    np.testing.assert_array_equal(partition(Row(least=11), bond, PartitionParameters()), [0, 0, 1, 1, 1])
+
+
+def test_small_parts_grow_until_they_are_large_enough():
+    part = partition(Row(least=25), np.array([-1.0, -2.0, -3.0, -4.0]), PartitionParameters())
+    # 0 joins 1, that is still too small and joins 2; 3 is pulled to that as well, and 4 to it.
+    assert part.max() == 0
+
+
+def test_two_sure_superpixels_make_a_part_one_that_has_moved():
+    moved = moved_parts(np.array([0, 0, 0, 1, 1]), np.array([4.0, 4.1, 0.0, 4.0, 3.9]), PartitionParameters())
+    np.testing.assert_array_equal(moved, [True, False])
+
+
+def test_the_larger_part_of_what_was_one_keeps_its_id():
+    part, area = np.array([0, 0, 0, 1, 1]), np.full(5, 10)
+    ids, following = with_ids(part, np.array([True, True]), area, [np.full(5, 7)], 9)
+    np.testing.assert_array_equal(ids, [7, 7, 7, 9, 9])
+    assert following == 10
+
+
+def test_of_two_that_turn_out_to_be_one_the_larger_gives_the_id():
+    ids, following = with_ids(
+        np.zeros(5, int), np.array([True]), np.full(5, 10), [np.array([3, 3, 8, 8, 8])], 9
+    )
+    np.testing.assert_array_equal(ids, [8] * 5)
+    assert following == 9
+
+
+def test_what_has_not_moved_has_no_id():
+    ids, _ = with_ids(np.array([0, 0, 1, 1, 1]), np.array([False, True]), np.full(5, 10), [np.zeros(5, int)], 1)
+    np.testing.assert_array_equal(ids, [0, 0, 1, 1, 1])
+
+
+def test_what_was_believed_binds_more_than_what_the_frame_before_said():
+    believed, said = np.array([2, 2, 0, 0, 0]), np.array([5, 5, 2, 2, 2])
+    part = np.array([0, 0, 1, 1, 1])
+    ids, following = with_ids(part, np.array([True, True]), np.full(5, 10), [believed, said], 6)
+    np.testing.assert_array_equal(ids, [2, 2, 6, 6, 6])
+    assert following == 7
+
+
+def test_the_margin_is_what_the_weakest_seam_withstands():
+    parameters = PartitionParameters(margins=(0.5, 1.0, 2.0, 4.0))
+    # One body whose seam between 2 and 3 is worth 0.8 nats: it holds at 0.5 and falls apart at 1.
+    body = np.ones(5, int)
+    assert margins(Row(), np.array([9.0, 9.0, 0.8, 9.0]), body, parameters) == {1: 1.0}
+    assert margins(Row(), np.array([9.0, 9.0, 9.0, 9.0]), body, parameters) == {1: 8.0}
+
+
+def test_two_that_nearly_merge_are_both_in_doubt():
+    parameters = PartitionParameters(margins=(0.5, 1.0, 2.0, 4.0))
+    body = np.array([1, 1, 1, 2, 2])
+    assert margins(Row(), np.array([9.0, 9.0, -0.4, 9.0]), body, parameters) == {1: 0.5, 2: 0.5}
+    # Merging with what has not moved is no doubt about which objects there are.
+    assert margins(Row(), np.array([9.0, 9.0, -0.4, 9.0]), np.array([1, 1, 1, 0, 0]), parameters)[1] == 8.0
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_parts_do_not_depend_on_which_end_is_first(mirrored):
+    bond = np.array([2.0, -1.0, 0.5, 3.0])
+    part = partition(Row(), bond[::-1] if mirrored else bond, PartitionParameters())
+    sizes = [np.count_nonzero(part == p) for p in part]
+    assert sizes == ([3, 3, 3, 2, 2] if mirrored else [2, 2, 3, 3, 3])

@@ -1,0 +1,68 @@
+"""Line 7 by evidence: a rendered body that is pushed gets one id, sharper still once it is at rest."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from riseg_drake.segmentation.segment import SegmentParameters
+from riseg_drake.segmentation.segment_by_evidence import nothing_evident, segment_by_evidence
+from tests.segmentation.algorithm import Algorithm
+from tests.segmentation.drawn_scene import intersection_over_union
+
+BY_EVIDENCE = SegmentParameters(method="evidence")
+
+
+@pytest.fixture(scope="module")
+def watched(pushed):
+    """The algorithm after the push and a rest, its answers, and the truth, frame by frame."""
+    algorithm = Algorithm(segment=BY_EVIDENCE)
+    shown = [*pushed, *resting(pushed)]
+    return algorithm, [algorithm.take(frame) for frame, _ in shown], [label for _, label in shown]
+
+
+def resting(pushed) -> list:
+    """The last frame three times more: nothing moves, the camera neither."""
+    frame, label = pushed[-1]
+    return [(replace(frame, sequence=20 + k, time=frame.time + (k + 1) / 15), label) for k in range(3)]
+
+
+@pytest.mark.renders
+def test_a_body_that_is_pushed_gets_an_id_in_motion_and_its_neighbours_none(watched) -> None:
+    _, answers, truths = watched
+    for answer, truth in list(zip(answers, truths, strict=True))[9:]:
+        assert intersection_over_union(answer.mask > 0, truth == 1) > 0.9
+        assert np.mean(answer.mask[np.isin(truth, [2, 3])] == 0) > 0.97
+
+
+@pytest.mark.renders
+def test_at_rest_it_is_decided_once_and_the_frame_becomes_the_keyframe(watched) -> None:
+    _, answers, truths = watched
+    assert answers[0].belief.keyframe.frame.sequence == 0
+    keyframes = [answer.belief.keyframe.frame.sequence for answer in answers]
+    assert keyframes == [0] * 22 + [22]  # a tenth of a second after nothing moved any more
+    (only,) = set(np.unique(answers[-1].mask)) - {0}
+    assert intersection_over_union(answers[-1].mask == only, truths[-1] == 1) > 0.95
+    assert answers[-1].object_ids == (only,)
+    assert set(answers[-1].confidence) == {only}
+
+
+@pytest.mark.renders
+def test_the_same_pair_again_changes_nothing(watched) -> None:
+    algorithm, answers, _ = watched
+    pair, _, _, groups, above_0, above_1, parameters, bfif = algorithm.inputs
+    again = segment_by_evidence(answers[-1], pair, groups, above_0, above_1, parameters.evidence, bfif)
+    assert again is answers[-1]
+
+
+@pytest.mark.renders
+def test_the_same_frames_give_the_same_masks_to_the_byte(watched, pushed) -> None:
+    again = Algorithm(segment=BY_EVIDENCE)
+    for (frame, _), answer in zip([*pushed, *resting(pushed)], watched[1], strict=True):
+        assert again.take(frame).mask.tobytes() == answer.mask.tobytes()
+
+
+def test_at_first_nothing_is_segmented() -> None:
+    start = nothing_evident((3, 4))
+    assert not start.mask.any()
+    assert start.object_ids == ()
