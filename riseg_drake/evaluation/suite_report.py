@@ -32,7 +32,7 @@ class KindResult:
 
     @property
     def interactions(self) -> float:
-        """Number of interactions that were made, mean over the scenes."""
+        """How many times things were pushed in a scene, on the mean."""
         return float(np.mean([scene.interactions for scene in self.scenes]))
 
     @property

@@ -211,9 +211,12 @@ class RigidFit:
     """The frame of t: what pixels of t-1 find there, and the motion that fits them."""
 
     X_C1C0: NDArray[np.float64]
+    """[4, 4]."""
     intrinsics: Intrinsics
     gray: NDArray[np.float32]
+    """[H, W]."""
     depth: NDArray[np.float32]
+    """[H, W], m."""
     depth_noise: float
     """Of the difference of two depths at 1 m, m."""
 

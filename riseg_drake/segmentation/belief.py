@@ -133,7 +133,10 @@ def next_belief(
     noise: MeasurementNoise,
     parameters: BeliefParameters,
 ) -> Belief:
-    """The belief, with what was seen, carried to a frame that becomes the keyframe."""
+    """The belief, with what was seen, carried to a frame that becomes the keyframe.
+
+    `remembered` [H, W] has ids where things that the old keyframe does not see should be now.
+    """
     old = belief.keyframe
     moves = {s + 1: bodies.motions_K[g] for s, g in enumerate(bodies.motion) if g > 0}
     carried = _carry(belief, np.arange(old.count) + 1, moves, frame, above, np.zeros_like(remembered))

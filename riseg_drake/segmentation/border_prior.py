@@ -30,8 +30,9 @@ class BorderPriorParameters:
     hole: float = -1.6
     """For the share of its pixels without depth."""
     most: float = 2.0
+    """A still picture proves nothing: log-odds, nats, are no more than that, ..."""
     least: float = -3.0
-    """A still picture proves nothing: log-odds stay between these."""
+    """... and no less than that, nats."""
 
 
 _NEAR, _FAR = 2, 4

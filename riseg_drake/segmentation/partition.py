@@ -1,7 +1,7 @@
 """Which superpixels are one body, which bodies have moved, and what the next best answer would cost."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ class PartitionParameters:
     """m^2; what is smaller is no object of its own."""
     moved_min: float = 8.0
     """Nats by which the superpixels of a body together must say that it has moved: two superpixels' worth."""
-    margins: tuple[float, ...] = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0)
+    margins: list[float] = field(default_factory=lambda: [0.5, 1.0, 1.5, 2.0, 3.0, 4.0])
     """Log-odds by which every bond is weakened, and strengthened, to see which bodies fall apart or merge."""
 
 

@@ -78,9 +78,9 @@ def test_every_cue_makes_one_body_less_likely_by_its_weight_and_the_picture_prov
     depth = np.ones((40, 40), np.float32)
     depth[:20] = 0
     both = border_prior(two_halves(FLAT, color, depth), parameters)
-    assert both == pytest.approx([2.75 - 0.024 * 60 - 0.8 * 0.5])
+    assert both == pytest.approx([3.0 - 0.045 * 60 - 1.6 * 0.5])
     step = border_prior(two_halves(np.where(U < 20, 0.03, 0.024), color, depth), parameters)
-    assert step == pytest.approx(both - 0.025 * 6 - 0.1 * 3)
+    assert step == pytest.approx(both - 0.2 * 3)
     deep = two_halves(np.where(np.abs(U - 19.5) < 3, 0.0, 0.03), color, np.zeros((40, 40), np.float32))
     assert border_prior(deep, parameters) == pytest.approx([-3.0])
 

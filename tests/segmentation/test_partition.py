@@ -82,7 +82,7 @@ def test_what_was_believed_binds_more_than_what_the_frame_before_said():
 
 
 def test_the_margin_is_what_the_weakest_seam_withstands():
-    parameters = PartitionParameters(margins=(0.5, 1.0, 2.0, 4.0))
+    parameters = PartitionParameters(margins=[0.5, 1.0, 2.0, 4.0])
     # One body whose seam between 2 and 3 is worth 0.8 nats: it holds at 0.5 and falls apart at 1.
     body = np.ones(5, int)
     assert margins(Row(), np.array([9.0, 9.0, 0.8, 9.0]), body, parameters) == {1: 1.0}
@@ -90,7 +90,7 @@ def test_the_margin_is_what_the_weakest_seam_withstands():
 
 
 def test_two_that_nearly_merge_are_both_in_doubt():
-    parameters = PartitionParameters(margins=(0.5, 1.0, 2.0, 4.0))
+    parameters = PartitionParameters(margins=[0.5, 1.0, 2.0, 4.0])
     body = np.array([1, 1, 1, 2, 2])
     assert margins(Row(), np.array([9.0, 9.0, -0.4, 9.0]), body, parameters) == {1: 0.5, 2: 0.5}
     # Merging with what has not moved is no doubt about which objects there are.
