@@ -76,9 +76,7 @@ def test_mass_properties_are_those_of_the_surface_and_collision_is_as_large(mode
     assert 0.02 < inertia.get_mass() < 0.5
     extent = np.array([vertices.min(axis=0), vertices.max(axis=0)])
     # A round wall is made of straight pieces.
-    assert (
-        np.abs(np.array([model.corners.min(axis=0), model.corners.max(axis=0)]) - extent).max() < 0.006
-    )
+    assert np.abs(np.array([model.corners.min(axis=0), model.corners.max(axis=0)]) - extent).max() < 0.006
     if "mug" not in model.name:  # the handle weighs nothing
         mesh = TriangleSurfaceMesh([SurfaceTriangle(*map(int, face)) for face in faces], list(vertices))
         volume = CalcSpatialInertia(mesh, 1.0).get_mass()
