@@ -19,7 +19,7 @@ class ThingScores:
     """How one true thing fared."""
 
     name: str
-    ids: set[int] = field(default_factory=set)
+    found_ids: set[int] = field(default_factory=set)
     """All that ever lay on it."""
     overlaps: list[float] = field(default_factory=list)
     """Intersection over union with the best id, in each frame from where it should be known on."""
@@ -60,7 +60,7 @@ class FilmScores:
             self.false_frames += bool(false.any())
         for thing in self.things:
             scores = self.of_thing.setdefault(thing.name, ThingScores(thing.name))
-            scores.ids |= {a for a, name in owner.items() if name == thing.name}
+            scores.found_ids |= {a for a, name in owner.items() if name == thing.name}
             where = true[thing.name]
             if where is not None and number >= thing.settled_at and where.any():
                 scores.overlaps.append(best_overlap(mask, where))
@@ -74,7 +74,7 @@ class FilmScores:
             "false_pixels_a_frame": self.false_pixels / max(self.frames, 1),
             "ms_a_frame": 1e3 * float(np.median(self.seconds)) if self.seconds else 0.0,
             "things": {
-                name: {"ids": len(scores.ids), "iou": float(np.mean(scores.overlaps or [0.0]))}
+                name: {"ids": len(scores.found_ids), "iou": float(np.mean(scores.overlaps or [0.0]))}
                 for name, scores in self.of_thing.items()
             },
         }
