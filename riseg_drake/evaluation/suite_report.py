@@ -38,7 +38,7 @@ class KindResult:
     @property
     def endings(self) -> dict[str, int]:
         """How many scenes ended for each reason, the most frequent first."""
-        reasons = [f"failed: {s.failure}" if s.failure else _reason(s.end) for s in self.scenes]
+        reasons = [f"failed: {s.failure}" if s.failure else s.ended or _reason(s.end) for s in self.scenes]
         return dict(Counter(reasons).most_common())
 
 
