@@ -23,12 +23,21 @@ def evaluate(chosen: argparse.Namespace, console: Console) -> None:
     if chosen.suite == "films":
         from riseg_drake.app.films import films_command
 
-        return films_command(chosen.seed, chosen.recordings, chosen.output, chosen.scenario, console)
+        return films_command(
+            chosen.seed, chosen.recordings, chosen.output, chosen.scenario, chosen.overwrite, console
+        )
     if chosen.suite is not None:
         from riseg_drake.app.suite import suite_command
 
         return suite_command(
-            chosen.suite, chosen.scenes, chosen.seed, chosen.jobs, chosen.output, chosen.dask, console
+            chosen.suite,
+            chosen.scenes,
+            chosen.seed,
+            chosen.jobs,
+            chosen.output,
+            chosen.dask,
+            chosen.overwrite,
+            console,
         )
     from riseg_drake.app.evaluate import evaluate_command
 

@@ -131,7 +131,7 @@ def _evaluate(
     failures: dict[Path, str] = {}
     console.print(_plan(tasks, todo, folder.path))
     with (
-        _interruption_told(folder, tasks),
+        interruption_told(folder, tasks),
         EvaluationProgress(len(tasks), len(tasks) - len(todo), console) as progress,
     ):
         for outcome in pool(todo):
@@ -196,7 +196,7 @@ def _count(scenes: int) -> str:
 
 
 @contextmanager
-def _interruption_told(folder: OutputFolder, tasks: Sequence[SceneTask]) -> Iterator[None]:
+def interruption_told(folder: OutputFolder, tasks: Sequence[SceneTask]) -> Iterator[None]:
     """After Ctrl-C, say what is there and how to go on."""
     try:
         yield

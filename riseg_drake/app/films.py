@@ -4,8 +4,8 @@ Ten films of still scenes by the simulated camera with all its errors, and recor
 its masks in a folder of its own with a `film.json`; what is finished is not done again.
 """
 
-import json
-from collections.abc import Callable, Iterable, Sequence
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from time import process_time
@@ -17,7 +17,7 @@ from rich.progress import track
 from riseg_drake.app.depth_figures import DEPTH_PICTURE, depth_figures, depth_table, draw_depth
 from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.output import RECORDING
-from riseg_drake.app.output_folder import SUMMARY, OutputError, to_json
+from riseg_drake.app.output_folder import OutputFolder, read_json, to_json
 from riseg_drake.app.recorded_view import recorded_view
 from riseg_drake.app.replay import Replay
 from riseg_drake.app.scenario import load_scenario
@@ -39,7 +39,12 @@ SUITE = "films"
 
 
 def films_command(
-    seed: int, recordings: Path | None, output: Path | None, scenario: Path | None, console: Console
+    seed: int,
+    recordings: Path | None,
+    output: Path | None,
+    scenario: Path | None,
+    overwrite: bool,
+    console: Console,
 ) -> None:
     """Make the films that are missing, segment what is not segmented, and write the tables.
 
@@ -48,45 +53,39 @@ def films_command(
         recordings: a folder of recordings, or None.
         output: folder (out/films_seed_S).
         scenario: parameters of the segmentation, or None for the built-in ones.
+        overwrite: whether earlier films in that folder are removed first.
         console: where to tell of it.
 
     Raises RecordingError, ThingsError or OutputError.
     """
     require_graphics()
     real = _recordings(recordings)
-    folder = output or Path("out") / f"films_seed_{seed}"
-    _claim(folder, {"suite": SUITE, "seed": seed, "scenario": str(scenario or "")})
-    rows: list[tuple[str, dict[str, Any]]] = []
-    with limited_threads(1):
-        for film in range(seed, seed + FILMS):
-            work = folder / f"film_{film:03d}"
-            recording = work / RECORDING
-            result = _finished(work)
-            if result is None:
-                _shoot(recording, film, console)
-                result = segment_film(recording, work, scenario, film, console)
-            rows.append((f"still scene, seed {film}", result))
-        for path in real:
-            work = folder / path.resolve().name
-            rows.append(
-                (path.resolve().name, _finished(work) or segment_film(path, work, scenario, 0, console))
-            )
-        shown = [folder / f"film_{seed:03d}" / RECORDING, *real]
-        figures = {path.resolve().name if path in real else "simulated": depth_figures(path) for path in shown}
-    draw_depth(shown, folder / DEPTH_PICTURE)
-    all_films = _together([row for _, row in rows[:FILMS]])
-    tables = film_table([("ten still scenes", all_films), *rows[FILMS:], *rows[:FILMS]])
-    report = "\n".join(["# Films", "", *tables, "", "# Depth", "", *depth_table(figures), ""])
-    write_text(folder / REPORT, report)
-    about = {
-        "suite": SUITE,
-        "seed": seed,
-        "scenario": str(scenario or ""),
-        "riseg_drake": version("riseg-drake"),
-    }
-    write_text(folder / SUMMARY, to_json({**about, "state": "done", "films": dict(rows), "depth": figures}))
+    path = output or Path("out") / f"films_seed_{seed}"
+    own = [path / f"film_{film:03d}" for film in range(seed, seed + FILMS)]
+    theirs = [path / recording.resolve().name for recording in real]
+    settings = {"suite": SUITE, "seed": seed, "scenario": str(scenario or "")}
+    with _claimed(path, settings, [*own, *theirs], overwrite) as folder:
+        rows: list[tuple[str, dict[str, Any]]] = []
+        with limited_threads(1):
+            for film, work in enumerate(own, seed):
+                result = _finished(work)
+                if not result:
+                    _shoot(work / RECORDING, film, console)
+                    result = segment_film(work / RECORDING, work, scenario, film, console)
+                rows.append((f"still scene, seed {film}", result))
+            for recording, work in zip(real, theirs, strict=True):
+                rows.append((work.name, _finished(work) or segment_film(recording, work, scenario, 0, console)))
+            shown = {"simulated": own[0] / RECORDING, **dict(zip([w.name for w in theirs], real, strict=True))}
+            figures = {name: depth_figures(recording) for name, recording in shown.items()}
+        all_films = _together([row for _, row in rows[:FILMS]])
+        tables = film_table([("ten still scenes", all_films), *rows[FILMS:], *rows[:FILMS]])
+        report = "\n".join(["# Films", "", *tables, "", "# Depth", "", *depth_table(figures), ""])
+        with folder.writing():
+            draw_depth(list(shown.values()), path / DEPTH_PICTURE)
+            write_text(path / REPORT, report)
+        folder.note(state="done", films=dict(rows), depth=figures)
     console.print(report, markup=False, highlight=False, soft_wrap=True)
-    console.print(f"report in {folder / REPORT}", highlight=False)
+    console.print(f"report in {path / REPORT}", highlight=False)
 
 
 def segment_film(
@@ -131,25 +130,16 @@ def _recordings(folder: Path | None) -> list[Path]:
     return found
 
 
-def _claim(folder: Path, about: dict[str, Any]) -> None:
-    """Make the folder, or make sure that what it holds is this suite's."""
-    try:
-        if folder.is_dir() and any(folder.iterdir()) and not _is_the_same(folder, about):
-            raise OutputError(
-                f"{folder} holds something else than these films; give a new folder with --output"
-            )
-        folder.mkdir(parents=True, exist_ok=True)
-        write_text(folder / SUMMARY, to_json({**about, "state": "running"}))
-    except OSError as error:
-        raise OutputError(f"cannot write to {folder}: {error.strerror}") from None
+def _claimed(path: Path, settings: Mapping[str, Any], films: Iterable[Path], overwrite: bool) -> OutputFolder:
+    """The films' folder, new or to be gone on with; `films` are the folders in it. Raises OutputError."""
+    about = {**settings, "riseg_drake": version("riseg-drake"), "state": "running"}
+    parts = "|".join([re.escape(REPORT), re.escape(DEPTH_PICTURE), *(re.escape(film.name) for film in films)])
 
+    def goes_on(earlier: Mapping[str, Any]) -> str:
+        same = all(earlier.get(key) == value for key, value in settings.items())
+        return "" if same else "which holds something else than these films"
 
-def _is_the_same(folder: Path, about: dict[str, Any]) -> bool:
-    try:
-        earlier = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    return isinstance(earlier, dict) and {key: earlier.get(key) for key in about} == about
+    return OutputFolder(path, "evaluate", parts, about, overwrite=overwrite, goes_on=goes_on)
 
 
 def _shoot(recording: Path, seed: int, console: Console) -> None:
@@ -166,12 +156,9 @@ def _told(items: Iterable[Any], total: int, what: str, console: Console) -> Iter
     return track(items, what, total=total, console=console, transient=True)
 
 
-def _finished(work: Path) -> dict[str, Any] | None:
-    try:
-        result: dict[str, Any] = json.loads((work / FILM_FILE).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    return result
+def _finished(work: Path) -> dict[str, Any]:
+    """The scores of a film that was segmented before; empty where it was not."""
+    return read_json(work / FILM_FILE)
 
 
 def _together(films: Sequence[dict[str, Any]]) -> dict[str, Any]:

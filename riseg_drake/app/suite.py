@@ -8,7 +8,6 @@ out/suite_clutter_seed_100/
     1_spread/                    report.md  figure.png  scene_000/ ... as `riseg evaluate` leaves them
 """
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,13 +18,13 @@ from typing import Any
 
 from rich.console import Console
 
-from riseg_drake.app.evaluate import EvaluationError, scene_tasks
+from riseg_drake.app.evaluate import REPORT, EvaluationError, interruption_told, scene_tasks
 from riseg_drake.app.evaluation_progress import EvaluationProgress
 from riseg_drake.app.graphics import require_graphics
-from riseg_drake.app.output_folder import SUMMARY, OutputError, to_json
+from riseg_drake.app.output_folder import OutputFolder
 from riseg_drake.app.scenario import Scenario, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
-from riseg_drake.app.scene_folder import SceneTask, digest, is_finished, read_json, read_result
+from riseg_drake.app.scene_folder import SceneTask, digest, is_finished, read_result
 from riseg_drake.app.scene_pool import Pool, cluster_pool, local_pool
 from riseg_drake.app.scene_work import SceneOutcome
 from riseg_drake.app.tables import score_table
@@ -36,7 +35,6 @@ from riseg_drake.evaluation.step_means import step_means
 from riseg_drake.evaluation.suite_report import KindResult, suite_figures, suite_text
 from riseg_drake.recording.whole_file import write_bytes, write_text
 
-REPORT = "report.md"
 SCENES = 5
 """Of each kind, where nothing else is asked for."""
 
@@ -62,6 +60,7 @@ def suite_command(
     jobs: int,
     output: Path | None,
     dask: str | None,
+    overwrite: bool,
     console: Console,
 ) -> None:
     """Run what is missing of a suite, then write its table. Raises EvaluationError where every scene failed."""
@@ -70,7 +69,8 @@ def suite_command(
     tasks = {kind: kind_tasks(kind, folder, scenes or SCENES, seed) for kind in kinds}
     if dask is None:
         require_graphics()
-    results = evaluate_suite(tasks, folder, local_pool(jobs) if dask is None else cluster_pool(dask), console)
+    pool = local_pool(jobs) if dask is None else cluster_pool(dask)
+    results = evaluate_suite(tasks, folder, pool, console, overwrite)
     rows = [(each.name, step_means([s.scores for s in each.scenes], each.last_step)[-1]) for each in results]
     console.print("\nafter the last interaction, means over the scenes of each kind, in percent")
     console.print(score_table(rows, first="\nkind"))
@@ -99,34 +99,36 @@ def find_suite(name_or_folder: str) -> list[Kind]:
 
 
 def evaluate_suite(
-    tasks: Mapping[Kind, Sequence[SceneTask]], folder: Path, pool: Pool, console: Console
+    tasks: Mapping[Kind, Sequence[SceneTask]],
+    path: Path,
+    pool: Pool,
+    console: Console,
+    overwrite: bool = False,
 ) -> list[KindResult]:
     """Work on the scenes of all kinds that are not finished yet, and write the table.
 
-    All kinds share the pool, so that no process waits for the last scene of a kind. Raises OutputError if the
-    folder belongs to something else; KeyboardInterrupt says how far it came.
+    All kinds share the pool, so that no process waits for the last scene of a kind. With `overwrite` an earlier
+    run of the suite is removed first. Raises OutputError if the folder belongs to something else;
+    KeyboardInterrupt says how far it came.
     """
-    every = [(kind, task) for kind, group in tasks.items() for task in group]
-    about = _claim(folder, tasks)
-    todo = [task for _, task in every if not is_finished(task)]
-    outcomes: dict[Path, SceneOutcome] = {}
-    before = f", {len(every) - len(todo)} finished before" if len(todo) < len(every) else ""
-    console.print(f"{len(tasks)} kinds, {len(every)} scenes{before}; results in {folder}")
-    try:
-        with EvaluationProgress(len(every), len(every) - len(todo), console) as progress:
+    every = [task for group in tasks.values() for task in group]
+    with _claimed(path, tasks, overwrite) as folder:
+        todo = [task for task in every if not is_finished(task)]
+        outcomes: dict[Path, SceneOutcome] = {}
+        before = f", {len(every) - len(todo)} finished before" if len(todo) < len(every) else ""
+        console.print(f"{len(tasks)} kinds, {len(every)} scenes{before}; results in {path}")
+        with (
+            interruption_told(folder, every),
+            EvaluationProgress(len(every), len(every) - len(todo), console) as progress,
+        ):
             for outcome in pool(todo):
                 outcomes[outcome.task.folder] = outcome
                 progress.tell(_named(outcome), outcome.seconds)
-    except KeyboardInterrupt:
-        write_text(folder / SUMMARY, to_json({**about, "state": "interrupted"}))
-        done = sum(is_finished(task) for _, task in every)
-        raise KeyboardInterrupt(
-            f"{done} of {len(every)} scenes are finished; the same command goes on from there"
-        ) from None
-    settings = _about_text(about, tasks)
-    results = [_of_kind(kind, group, outcomes, settings) for kind, group in tasks.items()]
-    write_text(folder / REPORT, suite_text(results, settings))
-    write_text(folder / SUMMARY, to_json({**about, "state": "done", "kinds": suite_figures(results)}))
+        settings = _about_text(folder.summary, tasks)
+        with folder.writing():
+            results = [_of_kind(kind, group, outcomes, settings) for kind, group in tasks.items()]
+            write_text(path / REPORT, suite_text(results, settings))
+        folder.note(state="done", kinds=suite_figures(results))
     return results
 
 
@@ -154,28 +156,24 @@ def _named(outcome: SceneOutcome) -> SceneResult:
     return replace(result, name=f"{outcome.task.scenario_name} {result.name}")
 
 
-def _claim(folder: Path, tasks: Mapping[Kind, Sequence[SceneTask]]) -> dict[str, Any]:
-    """Make the folder, or make sure that it is this suite's; returns what its summary begins with."""
+def _claimed(folder: Path, tasks: Mapping[Kind, Sequence[SceneTask]], overwrite: bool) -> OutputFolder:
+    """The suite's folder, new or to be gone on with. Raises OutputError."""
     settings = {
         "seed": next(iter(tasks.values()))[0].seed,
         "kinds_sha256": {kind.folder: digest(group[0].scenario) for kind, group in tasks.items()},
     }
-    about = {"suite": settings, "scenes": sum(map(len, tasks.values())), "riseg_drake": version("riseg-drake")}
-    if folder.exists() and not folder.is_dir():
-        raise OutputError(f"{folder} is a file; give a folder for the output")
-    try:
-        if folder.is_dir() and any(folder.iterdir()):
-            earlier = read_json(folder / SUMMARY).get("suite")
-            if json.loads(to_json(settings)) != earlier:
-                raise OutputError(
-                    f"{folder} is not empty and holds no earlier run of this suite with this seed; give a new "
-                    "folder with --output"
-                )
-        folder.mkdir(parents=True, exist_ok=True)
-        write_text(folder / SUMMARY, to_json({**about, "state": "running"}))
-    except OSError as error:
-        raise OutputError(f"cannot write to {folder}: {error.strerror}") from None
-    return about
+    about = {
+        "suite": settings,
+        "scenes": sum(map(len, tasks.values())),
+        "riseg_drake": version("riseg-drake"),
+        "state": "running",
+    }
+    parts = "|".join(map(re.escape, [REPORT, *settings["kinds_sha256"]]))
+
+    def goes_on(earlier: Mapping[str, Any]) -> str:
+        return "" if earlier.get("suite") == settings else "no earlier run of this suite with this seed"
+
+    return OutputFolder(folder, "evaluate", parts, about, overwrite=overwrite, goes_on=goes_on)
 
 
 def _about_text(about: Mapping[str, Any], tasks: Mapping[Kind, Sequence[SceneTask]]) -> dict[str, object]:
