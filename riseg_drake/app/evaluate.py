@@ -197,7 +197,7 @@ def _count(scenes: int) -> str:
 
 @contextmanager
 def interruption_told(folder: OutputFolder, tasks: Sequence[SceneTask]) -> Iterator[None]:
-    """After Ctrl-C, say what is there and how to go on."""
+    """After Ctrl-C, say what is there and how to go on: raises KeyboardInterrupt with that sentence."""
     try:
         yield
     except KeyboardInterrupt:

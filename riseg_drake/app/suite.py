@@ -158,9 +158,10 @@ def _named(outcome: SceneOutcome) -> SceneResult:
 
 def _claimed(folder: Path, tasks: Mapping[Kind, Sequence[SceneTask]], overwrite: bool) -> OutputFolder:
     """The suite's folder, new or to be gone on with. Raises OutputError."""
+    kinds = {kind.folder: digest(group[0].scenario) for kind, group in tasks.items()}
     settings = {
         "seed": next(iter(tasks.values()))[0].seed,
-        "kinds_sha256": {kind.folder: digest(group[0].scenario) for kind, group in tasks.items()},
+        "kinds_sha256": kinds,
     }
     about = {
         "suite": settings,
@@ -168,7 +169,7 @@ def _claimed(folder: Path, tasks: Mapping[Kind, Sequence[SceneTask]], overwrite:
         "riseg_drake": version("riseg-drake"),
         "state": "running",
     }
-    parts = "|".join(map(re.escape, [REPORT, *settings["kinds_sha256"]]))
+    parts = "|".join(map(re.escape, [REPORT, *kinds]))
 
     def goes_on(earlier: Mapping[str, Any]) -> str:
         return "" if earlier.get("suite") == settings else "no earlier run of this suite with this seed"
