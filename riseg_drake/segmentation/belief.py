@@ -60,8 +60,6 @@ class Bodies(Immutable):
 
     body: NDArray[np.intp]
     """[N], ids; 0 where nothing has moved yet."""
-    part: NDArray[np.intp]
-    """[N], of the partition, what has not moved included."""
     motion: NDArray[np.intp]
     """[N], index into `motions_K`; the same for all of a body."""
     motions_K: NDArray[np.float64]
@@ -87,7 +85,7 @@ def first_belief(
 def standing(belief: Belief) -> Bodies:
     """The bodies where nothing has moved since the keyframe."""
     still = np.zeros(belief.keyframe.count, np.intp)
-    return Bodies(belief.body, still, still, np.eye(4)[None], belief.next_id)
+    return Bodies(belief.body, still, np.eye(4)[None], belief.next_id)
 
 
 def bodies_of(belief: Belief, seen: Observation, before: Bodies | None, parameters: BeliefParameters) -> Bodies:
@@ -103,7 +101,7 @@ def bodies_of(belief: Belief, seen: Observation, before: Bodies | None, paramete
     ids, index = np.unique(body, return_inverse=True)
     total = np.array([np.bincount(index, m * seen.costs.witnesses, len(ids)) for m in seen.costs.misfit])
     motion = np.where(body > 0, total.argmin(0)[index], 0)
-    return Bodies(body, part, motion, seen.motions_K, next_id)
+    return Bodies(body, motion, seen.motions_K, next_id)
 
 
 def carry_bodies(
