@@ -28,7 +28,7 @@ from riseg_drake.pushing.push import Push
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture
 from riseg_drake.robot.supervisor import MOVE
 from riseg_drake.stations.command_process import CommandProcess
-from riseg_drake.stations.hardware import HardwareStationConfig, as_drake_images
+from riseg_drake.stations.hardware import HardwareStationConfig
 from riseg_drake.stations.lcm_channels import open_lcm, receive_buffer_warning
 from riseg_drake.stations.lcm_images import ImageError, decode_images
 from riseg_drake.stations.lcm_reception import Reception
@@ -178,9 +178,7 @@ def _what_is_missing(reception: Reception, config: HardwareStationConfig, ready:
         return "no picture came that can be used"
     sent, message = newest
     try:
-        as_drake_images(
-            decode_images(message, (config.camera.full_width, config.camera.full_height)), config.camera
-        )
+        decode_images(message, (config.camera.full_width, config.camera.full_height))
     except ImageError as error:
         reception.skip(sent, error)
         return "no picture came that can be used"

@@ -296,13 +296,8 @@ class LcmView(LeafSystem):
 
 
 def as_drake_images(images: LcmImages, config: HardwareCameraConfig) -> tuple[ImageRgba8U, ImageDepth32F]:
-    """The part of a picture that is used, and where its depth is believed. Raises ImageError."""
+    """The part of a picture that is used, and where its depth is believed; it has the camera's size."""
     height, width = images.depth.shape
-    if (width, height) != (config.full_width, config.full_height):
-        raise ImageError(
-            f"the camera sends {width}x{height} pixels, and the scenario's intrinsics are for "
-            f"{config.full_width}x{config.full_height}"
-        )
     columns = slice(config.first_column, width - config.first_column)
     cropped = images.depth[:, columns]
     color = ImageRgba8U(cropped.shape[1], height)
