@@ -10,7 +10,7 @@ from pydrake.trajectories import PiecewisePolynomial
 from riseg_drake.geometry.se3 import translation
 from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest
 from riseg_drake.robot.kinematics import MIN_CLEARANCE, PandaKinematics
-from riseg_drake.robot.supervisor import Mode
+from riseg_drake.robot.supervisor import Cause, Mode
 from riseg_drake.stations.command_process import CommandProcess
 from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.hardware import TARGET_PERIOD
@@ -25,6 +25,16 @@ ROOM = 0.01
 
 class TravelError(RuntimeError):
     """The arm does not get there; says in one line why."""
+
+
+def told(cause: Cause) -> str:
+    """Why the arm does not move, and what to do about it where the cause alone does not say that."""
+    if cause is Cause.STATUS_OLD:
+        return (
+            f"{cause.value}; a driver that has ended must be started again, with station.command.mode as its "
+            "--control_mode (with another one it ends at the first command)"
+        )
+    return cause.value
 
 
 def straight_motion(
@@ -119,9 +129,9 @@ def travel(
         if report is None:
             continue
         if report.state.mode in (Mode.STOPPED, Mode.ENDED):
-            raise TravelError(f"the arm was stopped: {report.state.cause.value}")
+            raise TravelError(f"the arm was stopped: {told(report.state.cause)}")
         arrived = report.status is not None and np.abs(report.status.position - goal).max() < ARRIVED
         if arrived and report.behind == 0 and report.at_rest and clock() > start + duration + LINGER:
             return
-    cause = report.state.cause.value or "it did not arrive in time" if report else "it says nothing"
+    cause = told(report.state.cause) or "it did not arrive in time" if report else "it says nothing"
     raise TravelError(f"the arm did not get to where it should: {cause}")

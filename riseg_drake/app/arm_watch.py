@@ -5,7 +5,7 @@ import time
 
 from pydrake.systems.framework import Context
 
-from riseg_drake.app.arm_travel import TravelError, WayBack
+from riseg_drake.app.arm_travel import TravelError, WayBack, told
 from riseg_drake.app.diagram import WiredDiagram
 from riseg_drake.app.interactions import Progress
 from riseg_drake.app.terminal_operator import TerminalOperator
@@ -70,8 +70,7 @@ class ArmWatch:
         now = time.monotonic()
         if now - self._told.get(cause, -math.inf) >= self.QUIET:
             self._told[cause] = now
-            hint = "; a driver that has ended must be started again" if cause is Cause.STATUS_OLD else ""
-            self._operator.tell(f"paused: {cause.value}{hint}")
+            self._operator.tell(f"paused: {told(cause)}")
 
     def _announce_contact(self, context: Context) -> None:
         push: Push = self._wired.read("active_push", context)
