@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from pydrake.common.value import AbstractValue
-from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
+from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
 
 from riseg_drake.geometry.rgbd import NO_FRAME, NO_PAIR, Frame, FramePair, Immutable
 from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE, AboveTable
@@ -72,11 +72,12 @@ class FramePairMemory(LeafSystem):
             "pair_time", 1, self._calc_pair_time, prerequisites_of_calc={self.all_state_ticket()}
         )
 
-    def _take_frame(self, context: Context, state: State) -> None:
+    def _take_frame(self, context: Context, state: State) -> EventStatus:
         frame: Frame = self._frame.Eval(context)
         memory = self._recall(context)
         if frame.time <= memory.pair.current.time:  # as that of NO_FRAME always is
-            return
+            # Said so, lest all that follows from the state be computed anew: flow, for one.
+            return EventStatus.DidNothing()
         above = self._above.Eval(context)
         if memory.pair is NO_PAIR:
             pair = next_pair(NO_PAIR, frame, 0.0, self._parameters)
@@ -91,6 +92,7 @@ class FramePairMemory(LeafSystem):
                 memory.pose_error, memory.pair.current, memory.above_1, frame, above, self._camera_motion
             )
         state.get_mutable_abstract_state(self._memory).set_value(RememberedPair(pair, above_0, above, error))
+        return EventStatus.Succeeded()
 
     def _recall(self, context: Context) -> RememberedPair:
         return context.get_abstract_state(int(self._memory)).get_value()

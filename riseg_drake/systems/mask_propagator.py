@@ -1,7 +1,7 @@
 """Segment (Alg. 2, line 7) as a system, and the one place where L_t-1 is kept."""
 
 from pydrake.common.value import AbstractValue
-from pydrake.systems.framework import Context, LeafSystem, State
+from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR, FramePair
@@ -88,11 +88,12 @@ class MaskPropagator(LeafSystem):
     def _segmentation(self, context: Context) -> Segmentation | EvidentSegmentation:
         return context.get_abstract_state(self._state).get_value()
 
-    def _update(self, context: Context, state: State) -> None:
+    def _update(self, context: Context, state: State) -> EventStatus:
         pair: FramePair = self._pair.Eval(context)
         if pair is NO_PAIR or pair.current.sequence == self._segmentation(context).sequence:
-            return
+            return EventStatus.DidNothing()
         self._segment(context, state, pair)
+        return EventStatus.Succeeded()
 
     @timed
     def _segment(self, context: Context, state: State, pair: FramePair) -> None:

@@ -32,9 +32,10 @@ class Film(LeafSystem):
     The camera's place along x is joint 1, the number of the frame joint 2; the tremble is joint 7's.
     """
 
-    def __init__(self, frames) -> None:
+    def __init__(self, frames, ticks: int) -> None:
+        """Each frame stays for some ticks of the diagram's."""
         super().__init__()
-        self._frames = frames
+        self._frames, self._ticks = frames, ticks
         self._shown = self.DeclareDiscreteState([0.0])
         self.DeclarePeriodicDiscreteUpdateEvent(PERIOD, PERIOD, self._tick)
         for name, model, calc in (
@@ -46,10 +47,10 @@ class Film(LeafSystem):
         self.DeclareVectorOutputPort("position", 7, self._calc_position)
 
     def _number(self, context) -> int:
-        return int(context.get_discrete_state(self._shown)[0])
+        return int(context.get_discrete_state(self._shown)[0]) // self._ticks
 
     def _tick(self, context, state) -> None:
-        state.get_mutable_vector(self._shown)[0] = self._number(context) + 1
+        state.get_mutable_vector(self._shown)[0] += 1
 
     def _calc_color(self, context, output) -> None:
         image = ImageRgba8U(CAMERA.width, CAMERA.height)
@@ -62,7 +63,7 @@ class Film(LeafSystem):
         output.set_value(image)
 
     def _calc_time(self, context, output) -> None:
-        output[0] = self._number(context) * PERIOD
+        output[0] = self._number(context) * self._ticks * PERIOD
 
     def _calc_position(self, context, output) -> None:
         number = self._number(context)
@@ -116,9 +117,9 @@ def counts(monkeypatch) -> Counter:
 class Chain:
     """The film, the wired stages and the reader."""
 
-    def __init__(self, frames, counts: Counter) -> None:
+    def __init__(self, frames, counts: Counter, ticks: int = 1) -> None:
         builder = DiagramBuilder()
-        film = builder.AddSystem(Film(frames))
+        film = builder.AddSystem(Film(frames, ticks))
         method = DisFlow()
 
         def flow(color_0: np.ndarray, color_1: np.ndarray) -> np.ndarray:
@@ -191,6 +192,15 @@ def test_every_stage_works_once_a_frame_though_someone_reads_at_500_hz(drawn_fra
         chain.simulator.AdvanceTo(number * PERIOD - JUST_BEFORE)
         assert dict(counts) == dict.fromkeys(STAGES, number)
     assert chain.reader.reads > 200
+
+
+def test_stages_do_not_work_again_where_the_camera_is_slower_than_the_diagram(drawn_frames, counts) -> None:
+    ticks, frames = 3, drawn_frames[:5]
+    chain = Chain(frames, counts, ticks)
+    for number in range(1, len(frames) + 1):
+        chain.simulator.AdvanceTo(number * ticks * PERIOD - JUST_BEFORE)
+        for stage in ("optical_flow", "expected_flow", "group_body_frames", "segment"):
+            assert counts[stage] == number, stage
 
 
 def test_the_wired_systems_give_the_masks_that_the_functions_give(drawn_frames, counts) -> None:
