@@ -13,12 +13,8 @@ from riseg_drake.segmentation.border_prior import BorderPriorParameters, border_
 from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe
 from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.observation import Observation
-from riseg_drake.segmentation.partition import PartitionParameters, moved_parts, partition, with_ids
+from riseg_drake.segmentation.partition import PartitionParameters, partition, with_ids
 from riseg_drake.segmentation.propagation import carry_labels
-
-_NEVER_MOVED = -3.0
-"""Log-odds of having moved of what has not been seen moving: three nats for standing still."""
-
 
 @dataclass
 class BeliefParameters:
@@ -42,8 +38,6 @@ class Belief(Immutable):
     """[M], log-odds that both sides of a border are one body, by the still picture."""
     evidence: NDArray[np.float64]
     """[M], what motion has added."""
-    moved: NDArray[np.float64]
-    """[N], log-odds of ever having moved."""
     body: NDArray[np.intp]
     """[N], ids; 0 where nothing has moved yet."""
     next_id: int
@@ -76,7 +70,6 @@ def first_belief(
         keyframe=keyframe,
         prior=border_prior(keyframe, parameters.prior),
         evidence=np.zeros(len(keyframe.borders)),
-        moved=np.full(keyframe.count, _NEVER_MOVED),
         body=np.zeros(keyframe.count, np.intp),
         next_id=1,
     )
@@ -93,15 +86,17 @@ def bodies_of(belief: Belief, seen: Observation, before: Bodies | None, paramete
     the frame before."""
     keyframe = belief.keyframe
     part = partition(keyframe, belief.bond + seen.evidence, parameters.partition)
-    moved = moved_parts(part, np.maximum(belief.moved, seen.moved), parameters.partition)
+    count = int(part.max(initial=-1)) + 1
+    # A body is rigid: it has the motion that explains all of it best, and to move at all must explain much.
+    worse = np.array([np.bincount(part, nats, count) for nats in seen.nats])
+    worse[1:] += parameters.partition.moved_min
+    motion = worse.argmin(0)
+    found_before = np.bincount(part, keyframe.area * (belief.body > 0), count)
+    moved = (motion > 0) | (2 * found_before > np.bincount(part, keyframe.area, count))
     previous = [belief.body] if before is None else [belief.body, before.body]
     next_id = belief.next_id if before is None else before.next_id
     body, next_id = with_ids(part, moved, keyframe.area, previous, next_id)
-    # A body is rigid: it has the motion that explains all of it best.
-    ids, index = np.unique(body, return_inverse=True)
-    total = np.array([np.bincount(index, m * seen.costs.witnesses, len(ids)) for m in seen.costs.misfit])
-    motion = np.where(body > 0, total.argmin(0)[index], 0)
-    return Bodies(body, motion, seen.motions_K, next_id)
+    return Bodies(body, motion[part], seen.motions_K, next_id)
 
 
 def carry_bodies(
@@ -144,17 +139,15 @@ def next_belief(
     new = make_keyframe(frame, above, noise, parameters.keyframe, ids)
     source = _most_seen(new, carried) - 1
     known = source >= 0
-    evidence, moved = belief.evidence, belief.moved
+    evidence = belief.evidence
     if seen is not None:
         evidence = np.clip(evidence + seen.evidence, -parameters.most, parameters.most)
-        moved = np.maximum(moved, seen.moved)
     body = np.where(known, bodies.body[source], _most_seen(new, np.where(carried == 0, ids, 0)))
     prior = border_prior(new, parameters.prior)
     return Belief(
         keyframe=new,
         prior=prior,
         evidence=_carried_evidence(old, belief.prior, evidence, new, prior, source, body, parameters),
-        moved=np.where(known, moved[source], np.where(body > 0, -_NEVER_MOVED, _NEVER_MOVED)),
         body=body,
         next_id=bodies.next_id,
     )

@@ -31,6 +31,8 @@ class LikelihoodParameters:
     """What it adds to a pixel's squared residual if the light on its superpixel is taken to have changed."""
     correlated_pixels: float = 6.0
     """Noise of depth and gray is correlated over about so many pixels; they count as one."""
+    chance: float = 1.5
+    """Times the mean squared residual that is usual, up to which a superpixel's may be by chance."""
     superpixel_max: float = 4.0
     """Nats that one superpixel may say for a motion against another: its errors are its own."""
 
@@ -49,12 +51,17 @@ class Costs:
         return Costs(np.vstack([self.misfit, other.misfit]), self.witnesses)
 
     def nats(self, parameters: LikelihoodParameters) -> NDArray[np.float64]:
-        """[G, N], how much worse than the best each motion is, by the noise that is there, bounded."""
+        """[G, N], how much worse than the best each motion is, by the noise that is there, bounded.
+
+        A residual within the noise says no more than that: what is better by chance is no better. So a blank
+        surface, which any motion along itself explains, speaks for none of them.
+        """
         asked = self.witnesses > parameters.correlated_pixels
-        best = self.misfit.min(0)
-        dispersion = max(1.0, float(np.median(best[asked])) / EXPECTED) if asked.any() else 1.0
-        worse = (self.misfit - best) * self.witnesses / (2 * parameters.correlated_pixels * dispersion)
-        return np.minimum(worse, parameters.superpixel_max)
+        level = float(np.median(self.misfit.min(0)[asked])) if asked.any() else EXPECTED
+        misfit = np.maximum(self.misfit, parameters.chance * level)
+        dispersion = max(1.0, level / EXPECTED)
+        scale = self.witnesses / (2 * parameters.correlated_pixels * dispersion)
+        return np.minimum((misfit - misfit.min(0)) * scale, parameters.superpixel_max)
 
 
 def motion_costs(

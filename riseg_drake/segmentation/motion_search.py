@@ -59,20 +59,20 @@ def search_motions(
     keyframe: Keyframe,
     frame: Frame,
     bond: NDArray[np.float64],
-    known_K: NDArray[np.float64],
+    proposed_K: NDArray[np.float64],
     depth_noise: float,
     gain_min: float,
     parameters: MotionSearchParameters,
     likelihood: LikelihoodParameters,
     parts: PartitionParameters,
 ) -> NDArray[np.float64]:
-    """Motions [C, 4, 4] in the keyframe's camera that explain what standing still and the known ones do not.
+    """Motions [C, 4, 4] in the keyframe's camera that explain what standing still does not.
 
     Args:
         keyframe: at the rest before.
         frame: at the rest after.
         bond: [M], log-odds of the keyframe's borders.
-        known_K: [G, 4, 4], motions that may explain some of it, the first of them standing still.
+        proposed_K: [G, 4, 4], what was seen in motion; taken where it explains what nothing found does.
         depth_noise: standard deviation of depth at 1 m, m.
         gain_min: nats that a motion must bring.
         parameters: see there.
@@ -80,7 +80,7 @@ def search_motions(
         parts: what is large enough for a body.
     """
     search = _Search(keyframe, frame, depth_noise, parameters, likelihood)
-    costs = motion_costs(keyframe, frame, known_K, depth_noise, likelihood)
+    costs = motion_costs(keyframe, frame, np.eye(4)[None], depth_noise, likelihood)
     asked = costs.witnesses > likelihood.correlated_pixels
     tried = np.zeros(keyframe.count, bool)
     whole = partition(keyframe, bond, parts)
@@ -105,6 +105,11 @@ def search_motions(
             costs = costs.with_motion(best[2])
             # What it did not explain may be tried with other neighbours.
             tried &= costs.misfit.min(0) > parameters.unexplained
+    for motion in proposed_K:
+        gain, motion, own = search.sharpened(motion, costs)
+        if gain >= gain_min:
+            found.append(motion)
+            costs = costs.with_motion(own)
     return np.array(found).reshape(-1, 4, 4)
 
 
@@ -169,10 +174,21 @@ class _Search:
             results.append((self._gain(own, best_known), motion, own))
         return max(results, key=lambda result: result[0]) if results else None
 
+    def sharpened(self, motion: NDArray, costs: Costs) -> tuple[float, NDArray, Costs]:
+        """A proposed motion [4, 4], made to fit what it explains: the gain, nats, the motion, and its costs."""
+        mine = self._costs(motion).misfit[0]
+        members = (mine < self._parameters.unexplained + 1) & (mine < costs.misfit.min(0) - 0.3)
+        edges = np.flatnonzero(members[self._keyframe.edges.piece])
+        if len(edges) >= 25:
+            alignment = self._parameters.alignment
+            motion, _ = self._fit.align(self._keyframe.edges.subset(edges), motion, alignment.rounds, alignment)
+        own = self._costs(motion)
+        return self._gain(own, costs.misfit.min(0)), motion, own
+
     def _gain(self, own: Costs, best_known: NDArray[np.float64]) -> float:
         """Nats by which a motion explains better what it explains well."""
-        scale = own.witnesses / (2 * self._likelihood.correlated_pixels)
-        better = np.clip((best_known - own.misfit[0]) * scale, 0, self._likelihood.superpixel_max)
+        nats = Costs(np.stack([best_known, own.misfit[0]]), own.witnesses).nats(self._likelihood)
+        better = np.clip(nats[0] - nats[1], 0, None)
         return float(better[own.misfit[0] < self._parameters.unexplained + 1].sum())
 
     def _costs(self, motion: NDArray) -> Costs:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
 from riseg_drake.segmentation.alignment import AlignmentParameters, align_motions
 from riseg_drake.segmentation.keyframe import Keyframe
-from riseg_drake.segmentation.likelihood import Costs, LikelihoodParameters, motion_costs
+from riseg_drake.segmentation.likelihood import LikelihoodParameters, motion_costs
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.potts import PottsGraph, potts_labels
 
@@ -49,12 +49,10 @@ class Observation(Immutable):
     """[G, 4, 4] since the keyframe, seen from its camera; the first is standing still."""
     motion: NDArray[np.intp]
     """[N], which of them each superpixel has."""
-    costs: Costs
-    """Of these motions."""
+    nats: NDArray[np.float64]
+    """[G, N], how much worse each motion explains each superpixel than the best one does."""
     evidence: NDArray[np.float64]
     """[M], log-odds that both sides of a border are one body."""
-    moved: NDArray[np.float64]
-    """[N], log-odds of having moved."""
     span: NDArray[np.float64]
     """[N], pixels by which its motion moves a superpixel: how well it tells motions apart."""
 
@@ -91,17 +89,13 @@ def observe(
     share[0] = max(share[0], parameters.still_share)
     share /= share.sum()
     q = motion_posterior(nats, share, parameters.outlier)
-    moved = np.zeros(keyframe.count)
-    if len(needed) > 1:
-        moved = nats[0] - nats[1:].min(0) - 0.5 * parameters.likelihood.superpixel_max
     focal_length, p_KQ = frame.intrinsics.fx, keyframe.edges.p_C0Q[::10]
     spans = [flow_difference(p_KQ, X, np.eye(4), focal_length) if len(p_KQ) else 0.0 for X in motions_K[needed]]
     return Observation(
         motions_K=motions_K[needed],
         motion=motion,
-        costs=Costs(costs.misfit[needed], costs.witnesses),
+        nats=nats,
         evidence=bond_evidence(q, share, keyframe.borders),
-        moved=moved,
         span=np.array(spans)[motion],
     )
 

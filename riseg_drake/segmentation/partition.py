@@ -17,7 +17,7 @@ class PartitionParameters:
     area_min: float = 3.0e-4
     """m^2; what is smaller is no object of its own."""
     moved_min: float = 8.0
-    """Nats by which the superpixels of a body together must say that it has moved: two superpixels' worth."""
+    """Nats by which a motion must explain a body better than standing still does: two superpixels' worth."""
     margins: list[float] = field(default_factory=lambda: [0.5, 1.0, 1.5, 2.0, 3.0, 4.0])
     """Log-odds by which every bond is weakened, and strengthened, to see which bodies fall apart or merge."""
 
@@ -31,13 +31,6 @@ def partition(
     return _without_small(
         part, keyframe.borders, weight, keyframe.area, parameters.area_min * keyframe.pixels_per_metre**2
     )
-
-
-def moved_parts(
-    part: NDArray[np.intp], moved: NDArray[np.float64], parameters: PartitionParameters
-) -> NDArray[np.bool_]:
-    """Which parts [P] have moved, by the log-odds of their superpixels [N]."""
-    return np.bincount(part, moved) > parameters.moved_min
 
 
 def with_ids(

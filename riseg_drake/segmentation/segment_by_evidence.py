@@ -156,9 +156,7 @@ def segment_by_evidence(
     )
     depth_noise = max(above_1.depth_noise, belief.keyframe.above.depth_noise)
     if deciding:
-        candidates_K = np.concatenate(
-            [candidates_K, _searched(belief, frame, candidates_K, depth_noise, parameters)]
-        )
+        candidates_K = _searched(belief, frame, candidates_K, depth_noise, parameters)
     if len(candidates_K):
         seen = observe(belief.keyframe, frame, belief.bond, candidates_K, depth_noise, parameters.observation)
         bodies = bodies_of(belief, seen, bodies, parameters.belief)
@@ -210,7 +208,7 @@ def _searched(
         belief.keyframe,
         frame,
         belief.bond,
-        np.concatenate([np.eye(4)[None], candidates_K]),
+        candidates_K,
         depth_noise,
         parameters.observation.motion_cost,
         parameters.search,
