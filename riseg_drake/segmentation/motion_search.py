@@ -91,26 +91,37 @@ def search_motions(
         unexplained = (costs.misfit.min(0) > parameters.unexplained) & asked
         patch, distance = search.densest_patch(unexplained & ~tried)
         if keyframe.area[patch].sum() < 0.2 * area_min:
-            # Where edges alone are unexplained, the blank surface between them belongs to it.
-            share = np.bincount(whole, keyframe.area * unexplained, len(whole_tried)) * ~whole_tried
-            if not len(share) or share.max() < 0.3 * area_min:
+            # Each piece of a blank surface may be explained, by one motion or another, and all of it by none.
+            short = unexplained_wholes(costs.nats(likelihood), whole) * ~whole_tried
+            if not len(short) or short.max() < gain_min:
                 break
-            patch = whole == share.argmax()
-            whole_tried[share.argmax()] = True
+            patch = whole == short.argmax()
+            whole_tried[short.argmax()] = True
             distance = np.where(patch, 0.0, np.inf)
         tried |= patch & unexplained
-        best = search.best_motion(patch, distance, costs)
+        best = search.best_motion(patch, distance, costs, whole)
         if best is not None and best[0] >= gain_min:
             found.append(best[1])
             costs = costs.with_motion(best[2])
             # What it did not explain may be tried with other neighbours.
             tried &= costs.misfit.min(0) > parameters.unexplained
     for motion in proposed_K:
-        gain, motion, own = search.sharpened(motion, costs)
+        gain, motion, own = search.sharpened(motion, costs, whole)
         if gain >= gain_min:
             found.append(motion)
             costs = costs.with_motion(own)
     return np.array(found).reshape(-1, 4, 4)
+
+
+def unexplained_wholes(nats: NDArray[np.float64], whole: NDArray[np.intp]) -> NDArray[np.float64]:
+    """[W], nats by which the one motion that explains a whole best falls short of the best of each piece.
+
+    Args:
+        nats: [G, N], how much worse than the best each motion explains each piece.
+        whole: [N], the whole 0..W-1 that each piece is part of.
+    """
+    count = int(whole.max(initial=-1)) + 1
+    return np.min([np.bincount(whole, n, count) for n in nats], axis=0)
 
 
 class _Search:
@@ -152,7 +163,7 @@ class _Search:
         return among & (distance < self._parameters.patch), distance
 
     def best_motion(
-        self, patch: NDArray[np.bool_], distance: NDArray[np.float64], costs: Costs
+        self, patch: NDArray[np.bool_], distance: NDArray[np.float64], costs: Costs, whole: NDArray[np.intp]
     ) -> tuple[float, NDArray, Costs] | None:
         """What a patch [N] did: the gain, nats, the motion [4, 4], and its costs."""
         best_known = costs.misfit.min(0)
@@ -171,10 +182,12 @@ class _Search:
                 fitted, alignment = self._keyframe.edges.subset(edges), self._parameters.alignment
                 motion, _ = self._fit.align(fitted, motion, alignment.rounds, alignment)
             own = self._costs(motion)
-            results.append((self._gain(own, best_known), motion, own))
+            results.append((self._gain(own, costs, whole), motion, own))
         return max(results, key=lambda result: result[0]) if results else None
 
-    def sharpened(self, motion: NDArray, costs: Costs) -> tuple[float, NDArray, Costs]:
+    def sharpened(
+        self, motion: NDArray, costs: Costs, whole: NDArray[np.intp]
+    ) -> tuple[float, NDArray, Costs]:
         """A proposed motion [4, 4], made to fit what it explains: the gain, nats, the motion, and its costs."""
         mine = self._costs(motion).misfit[0]
         members = (mine < self._parameters.unexplained + 1) & (mine < costs.misfit.min(0) - 0.3)
@@ -183,13 +196,14 @@ class _Search:
             alignment = self._parameters.alignment
             motion, _ = self._fit.align(self._keyframe.edges.subset(edges), motion, alignment.rounds, alignment)
         own = self._costs(motion)
-        return self._gain(own, costs.misfit.min(0)), motion, own
+        return self._gain(own, costs, whole), motion, own
 
-    def _gain(self, own: Costs, best_known: NDArray[np.float64]) -> float:
-        """Nats by which a motion explains better what it explains well."""
-        nats = Costs(np.stack([best_known, own.misfit[0]]), own.witnesses).nats(self._likelihood)
-        better = np.clip(nats[0] - nats[1], 0, None)
-        return float(better[own.misfit[0] < self._parameters.unexplained + 1].sum())
+    def _gain(self, own: Costs, costs: Costs, whole: NDArray[np.intp]) -> float:
+        """Nats by which a motion explains wholes better, or pieces of them."""
+        nats = costs.with_motion(own).nats(self._likelihood)
+        better = np.clip(nats[:-1].min(0) - nats[-1], 0, None)
+        of_wholes = unexplained_wholes(nats[:-1], whole) - unexplained_wholes(nats, whole)
+        return float(max(better[own.misfit[0] < self._parameters.unexplained + 1].sum(), of_wholes.max(initial=0)))
 
     def _costs(self, motion: NDArray) -> Costs:
         return motion_costs(self._keyframe, self._frame, motion[None], self._depth_noise, self._likelihood)

@@ -18,6 +18,7 @@ from riseg_drake.segmentation.alignment import AlignmentParameters, align_motion
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.likelihood import LikelihoodParameters, motion_costs
 from riseg_drake.segmentation.motions import flow_difference
+from riseg_drake.segmentation.partition import PartitionParameters, partition
 from riseg_drake.segmentation.potts import PottsGraph, potts_labels
 
 
@@ -129,6 +130,7 @@ def _fewest_motions(
     """The motions that are needed, and which of these each superpixel [N] has; drops the others one by one."""
     coupling = parameters.border * np.maximum(bond, parameters.border_least) * keyframe.length
     graph = PottsGraph(keyframe.count, keyframe.borders, coupling)
+    whole = partition(keyframe, bond, PartitionParameters())
     needed, message = list(range(len(nats))), None
     while True:
         unary = nats[needed].astype(np.float32)
@@ -136,8 +138,10 @@ def _fewest_motions(
         motion, message = potts_labels(unary, graph, message)
         gains = []
         for k in range(1, len(needed)):
-            mine = nats[np.ix_(needed, motion == k)].sum(1)
-            gains.append(float(np.delete(mine, k).min() - mine[k]))
+            mine = nats[np.ix_(needed, motion == k)]
+            # All of a whole, as far as it has this motion, would have another one.
+            others = np.delete(mine, k, axis=0) - mine[k]
+            gains.append(float(np.sum([others[:, whole[motion == k] == w].sum(1).min() for w in np.unique(whole[motion == k])])))
         if not gains or min(gains) >= parameters.motion_cost:
             return needed, motion
         dropped = int(np.argmin(gains)) + 1
