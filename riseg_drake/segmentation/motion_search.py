@@ -7,6 +7,7 @@ found, too.
 """
 
 from dataclasses import dataclass, field
+from itertools import product
 
 import cv2
 import numpy as np
@@ -168,11 +169,11 @@ class _Search:
         """What a patch [N] did: the gain, nats, the motion [4, 4], and its costs."""
         best_known = costs.misfit.min(0)
         results = []
-        for start in self._valleys(patch):
+        for start, better_by in product(self._valleys(patch), (0.3, -np.inf)):
             motion = start
             for radius in _GROWTH:
                 mine = self._costs(motion).misfit[0]
-                explained = (mine < self._parameters.unexplained + 1) & (mine < best_known - 0.3)
+                explained = (mine < self._parameters.unexplained + 1) & (mine < best_known - better_by)
                 if radius == _GROWTH[0] or not np.isfinite(distance).all():
                     explained |= patch
                 members = explained & (distance < radius * self._parameters.patch)
