@@ -17,6 +17,7 @@ from scipy.ndimage import minimum_filter
 from riseg_drake.geometry.camera import rays
 from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.geometry.se3 import inverse, skew
+from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.alignment import AlignmentParameters, rigid_fit
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.likelihood import EXPECTED, Costs, LikelihoodParameters, motion_costs
@@ -52,6 +53,8 @@ class MotionSearchParameters:
     )
 
 
+_RING = np.ones((13, 13), np.uint8)
+"""Six pixels around an outline are looked at: what was free there is free where it went."""
 _GROWTH = (1.0, 1.4, 4.0, 50.0)
 """Radii, in those of a patch, within which a motion is sharpened in turn."""
 
@@ -59,6 +62,7 @@ _GROWTH = (1.0, 1.4, 4.0, 50.0)
 def search_motions(
     keyframe: Keyframe,
     frame: Frame,
+    above: AboveTable,
     bond: NDArray[np.float64],
     proposed_K: NDArray[np.float64],
     depth_noise: float,
@@ -72,6 +76,7 @@ def search_motions(
     Args:
         keyframe: at the rest before.
         frame: at the rest after.
+        above: objMask of that frame.
         bond: [M], log-odds of the keyframe's borders.
         proposed_K: [G, 4, 4], what was seen in motion; taken where it explains what nothing found does.
         depth_noise: standard deviation of depth at 1 m, m.
@@ -80,7 +85,7 @@ def search_motions(
         likelihood: see there.
         parts: what is large enough for a body.
     """
-    search = _Search(keyframe, frame, depth_noise, parameters, likelihood)
+    search = _Search(keyframe, frame, above, depth_noise, parameters, likelihood)
     costs = motion_costs(keyframe, frame, np.eye(4)[None], depth_noise, likelihood)
     asked = costs.witnesses > likelihood.correlated_pixels
     tried = np.zeros(keyframe.count, bool)
@@ -132,6 +137,7 @@ class _Search:
         self,
         keyframe: Keyframe,
         frame: Frame,
+        above: AboveTable,
         depth_noise: float,
         parameters: MotionSearchParameters,
         likelihood: LikelihoodParameters,
@@ -150,6 +156,7 @@ class _Search:
         middle = [np.bincount(label[v, u], x, keyframe.count) / np.maximum(keyframe.area, 1) for x in (v, u)]
         self._middle = np.stack(middle, axis=1) / keyframe.pixels_per_metre
         """[N, 2], m, of each superpixel, about."""
+        self._standing = above.mask.astype(np.float32)
         self._normal = keyframe.frame.X_WC[:3, :3].T @ keyframe.above.plane_W[:3]
 
     def densest_patch(self, among: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
@@ -168,13 +175,15 @@ class _Search:
     ) -> tuple[float, NDArray, Costs] | None:
         """What a patch [N] did: the gain, nats, the motion [4, 4], and its costs."""
         best_known = costs.misfit.min(0)
+        blank = not np.isfinite(distance).all()
+        samples = self._parameters.samples * (3 if blank else 1)
         results = []
-        for start, better_by in product(self._valleys(patch), (0.3, -np.inf)):
+        for start, better_by in product(self._valleys(patch, samples), (0.3, -np.inf)):
             motion = start
             for radius in _GROWTH:
                 mine = self._costs(motion).misfit[0]
                 explained = (mine < self._parameters.unexplained + 1) & (mine < best_known - better_by)
-                if radius == _GROWTH[0] or not np.isfinite(distance).all():
+                if radius == _GROWTH[0] or blank:
                     explained |= patch
                 members = explained & (distance < radius * self._parameters.patch)
                 edges = np.flatnonzero(members[self._keyframe.edges.piece])
@@ -209,31 +218,49 @@ class _Search:
     def _costs(self, motion: NDArray) -> Costs:
         return motion_costs(self._keyframe, self._frame, motion[None], self._depth_noise, self._likelihood)
 
-    def _valleys(self, patch: NDArray[np.bool_]) -> list[NDArray]:
+    def _valleys(self, patch: NDArray[np.bool_], samples: int) -> list[NDArray]:
         """The best motions [4, 4] on the grid of slides and turns."""
         parameters, keyframe = self._parameters, self._keyframe
         witness = np.flatnonzero(patch[keyframe.owner])
         if len(witness) < parameters.samples // 3:
             return []
-        witness = np.sort(self._rng.permutation(witness)[: parameters.samples])
+        witness = np.sort(self._rng.permutation(witness)[:samples])
         v, u = keyframe.witnesses.pixel[:, witness]
         p_KQ = rays(self._frame.intrinsics)[v, u] * keyframe.witnesses.depth[witness, None]
+        beside = self._beside(patch, p_KQ, samples // 2)
         shifts = np.arange(-parameters.reach, parameters.reach + 1e-9, parameters.step)
         turns = np.arange(-parameters.turn, parameters.turn + 1e-9, parameters.turn_step)
         grid = np.stack(np.meshgrid(shifts, shifts, turns, indexing="ij"), axis=-1)
         motions = slides(self._normal, p_KQ.mean(0), grid.reshape(-1, 3))
-        cost = self._mean_costs(p_KQ, self._gray_0[v, u], self._variance[v, u], motions).reshape(grid.shape[:3])
+        cost = self._mean_costs(p_KQ, self._gray_0[v, u], self._variance[v, u], motions)
+        if len(beside):
+            cost += self._taken(beside, motions)
+        cost = cost.reshape(grid.shape[:3])
         lowest = np.flatnonzero((cost == minimum_filter(cost, 5)).ravel())
         order = lowest[np.argsort(cost.ravel()[lowest])][: parameters.best]
         return list(motions[order])
 
+    def _beside(self, patch: NDArray[np.bool_], p_KQ: NDArray, samples: int) -> NDArray[np.float64]:
+        """Points [S, 3] at a patch's height in the free space beside it, which moves with it."""
+        keyframe = self._keyframe
+        own = keyframe.image_of(patch).view(np.uint8)
+        ring = cv2.dilate(own, _RING) & ~cv2.dilate(keyframe.above.mask.view(np.uint8), np.ones((3, 3), np.uint8))
+        v, u = np.nonzero(ring & (keyframe.frame.depth > 0))
+        some = np.sort(self._rng.permutation(len(v))[:samples])
+        n = self._normal / np.linalg.norm(self._normal)
+        r = rays(self._frame.intrinsics)[v[some], u[some]]
+        return r * (np.median(p_KQ @ n) / (r @ n))[:, None]
+
+    def _taken(self, p_KQ: NDArray, motions: NDArray) -> NDArray:
+        """How much of free points [S, 3] is no longer free after motions [H, 4, 4], in squared residuals [H]."""
+        u, v, _ = self._places(p_KQ, motions)
+        taken = cv2.remap(self._standing, u, v, cv2.INTER_LINEAR, borderValue=0)
+        return self._likelihood.residual_max * taken.mean(1)
+
     def _mean_costs(self, p_KQ: NDArray, gray: NDArray, variance: NDArray, motions: NDArray) -> NDArray:
         """Mean squared residuals [H] under motions [H, 4, 4] of S points with gray values and variances."""
-        k, frame = self._frame.intrinsics, self._frame
-        X = (inverse(frame.X_WC) @ self._keyframe.frame.X_WC @ motions).astype(np.float32)
-        p_C1Q = np.einsum("hij,nj->hni", X[:, :3, :3], p_KQ.astype(np.float32)) + X[:, None, :3, 3]
-        z = p_C1Q[..., 2]
-        u, v = k.fx * p_C1Q[..., 0] / z + np.float32(k.cx), k.fy * p_C1Q[..., 1] / z + np.float32(k.cy)
+        frame = self._frame
+        u, v, z = self._places(p_KQ, motions)
         found = cv2.remap(self._gray_1, u, v, cv2.INTER_LINEAR, borderValue=0)
         z_1 = cv2.remap(frame.unhidden_depth, u, v, cv2.INTER_NEAREST, borderValue=0)
         most = self._likelihood.residual_max
@@ -241,6 +268,15 @@ class _Search:
         sigma = np.float32(2 * np.sqrt(2) * self._depth_noise) * z**2
         cost += np.where(z_1 > 0, np.minimum(((z_1 - z) / sigma) ** 2, most), EXPECTED / 2)
         return cost.mean(1)
+
+    def _places(self, p_KQ: NDArray, motions: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        """Where points [S, 3] appear in the frame after motions [H, 4, 4]: u, v, pixels, and depth, m, [H, S]."""
+        k, frame = self._frame.intrinsics, self._frame
+        X = (inverse(frame.X_WC) @ self._keyframe.frame.X_WC @ motions).astype(np.float32)
+        p_C1Q = np.einsum("hij,nj->hni", X[:, :3, :3], p_KQ.astype(np.float32)) + X[:, None, :3, 3]
+        z = p_C1Q[..., 2]
+        u, v = k.fx * p_C1Q[..., 0] / z + np.float32(k.cx), k.fy * p_C1Q[..., 1] / z + np.float32(k.cy)
+        return u, v, z
 
     def _blurred(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
         return cv2.GaussianBlur(image, (0, 0), self._parameters.blur)

@@ -49,6 +49,9 @@ class EvidenceParameters:
     belief: BeliefParameters = field(default_factory=BeliefParameters)
     settled: float = 2.0
     """Nats a border by which an object's outline must be better than the next best, not to be in doubt."""
+    in_view: float = 0.9
+    """Share of what the keyframe shows that a picture must show, too, to decide: a rest of the arm just after a
+    push sees little."""
     uncovered: float = 0.3
     """Share of what stands there that the keyframe does not show, from which the view needs another."""
     memory: bool = True
@@ -153,10 +156,14 @@ def segment_by_evidence(
         now.still_since is not None
         and not now.decided
         and (frame.time - now.still_since >= parameters.rest.time)
+        and (
+            _share_in_view(belief, bodies, frame) > parameters.in_view
+            or _leaves_keyframe(belief, bodies, frame, above_1, parameters)
+        )
     )
     depth_noise = max(above_1.depth_noise, belief.keyframe.above.depth_noise)
     if deciding:
-        candidates_K = _searched(belief, frame, candidates_K, depth_noise, parameters)
+        candidates_K = _searched(belief, frame, above_1, candidates_K, depth_noise, parameters)
     if len(candidates_K):
         seen = observe(belief.keyframe, frame, belief.bond, candidates_K, depth_noise, parameters.observation)
         bodies = bodies_of(belief, seen, bodies, parameters.belief)
@@ -200,6 +207,7 @@ def _bodies_before(now: EvidentSegmentation) -> Bodies:
 def _searched(
     belief: Belief,
     frame: Frame,
+    above: AboveTable,
     candidates_K: NDArray[np.float64],
     depth_noise: float,
     parameters: EvidenceParameters,
@@ -207,6 +215,7 @@ def _searched(
     return search_motions(
         belief.keyframe,
         frame,
+        above,
         belief.bond,
         candidates_K,
         depth_noise,
@@ -255,6 +264,21 @@ def _carried(
     return replace(
         now, margin=margin, belief=following, bodies={}, memory=memory, decided=now.decided or deciding
     )
+
+
+def _share_in_view(belief: Belief, bodies: Bodies, frame: Frame) -> float:
+    """How much of what the keyframe shows this frame shows with depth, where it should be by now."""
+    keyframe = belief.keyframe
+    every = slice(None, None, 1 + len(keyframe.owner) // 2000)
+    v, u = keyframe.witnesses.pixel[:, every]
+    p_KQ = rays(keyframe.frame.intrinsics)[v, u] * keyframe.witnesses.depth[every, None]
+    motion = bodies.motion[keyframe.owner[every]]
+    shown = 0
+    for k, X in enumerate(bodies.motions_K):
+        p_CQ = move_points(inverse(frame.X_WC) @ keyframe.frame.X_WC @ X, p_KQ[motion == k].astype(float))
+        (v, u), inside = (a.T for a in pixels_of(p_CQ, frame.intrinsics))
+        shown += np.count_nonzero(frame.unhidden_depth[v[inside], u[inside]] > 0)
+    return shown / max(1, len(p_KQ))
 
 
 def _leaves_keyframe(
