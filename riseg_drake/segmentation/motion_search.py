@@ -6,6 +6,7 @@ are sharpened, on ever more of what they explain. Texture, outline and height al
 found, too.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -21,6 +22,7 @@ from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.alignment import AlignmentParameters, rigid_fit
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.likelihood import EXPECTED, Costs, LikelihoodParameters, motion_costs
+from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.partition import PartitionParameters, partition
 
 
@@ -46,6 +48,8 @@ class MotionSearchParameters:
     """Valleys that are gone down."""
     unexplained: float = 4.0
     """Mean squared residuals from which a superpixel is not explained."""
+    same_flow: float = 1.0
+    """Pixels (root mean square) within which two motions are one, and what moves stands still."""
     rounds: int = 24
     """Patches that are tried at most."""
     alignment: AlignmentParameters = field(
@@ -106,14 +110,14 @@ def search_motions(
             distance = np.where(patch, 0.0, np.inf)
         tried |= patch & unexplained
         best = search.best_motion(patch, distance, costs, whole)
-        if best is not None and best[0] >= gain_min:
+        if best is not None and best[0] >= gain_min and search.differs(best[1], found, patch):
             found.append(best[1])
             costs = costs.with_motion(best[2])
             # What it did not explain may be tried with other neighbours.
             tried &= costs.misfit.min(0) > parameters.unexplained
     for motion in proposed_K:
         gain, motion, own = search.sharpened(motion, costs, whole)
-        if gain >= gain_min:
+        if gain >= gain_min and search.differs(motion, found, np.zeros(keyframe.count, bool)):
             found.append(motion)
             costs = costs.with_motion(own)
     return np.array(found).reshape(-1, 4, 4)
@@ -194,6 +198,16 @@ class _Search:
             own = self._costs(motion)
             results.append((self._gain(own, costs, whole), motion, own))
         return max(results, key=lambda result: result[0]) if results else None
+
+    def differs(self, motion: NDArray, others: Sequence[NDArray], patch: NDArray[np.bool_]) -> bool:
+        """Whether a motion takes a patch elsewhere than standing still and others [4, 4] do."""
+        p_KQ = self._keyframe.edges.p_C0Q
+        mine = p_KQ[patch[self._keyframe.edges.piece]]
+        p_KQ, focal_length = mine if len(mine) else p_KQ, self._frame.intrinsics.fx
+        return all(
+            flow_difference(p_KQ, motion, X, focal_length) > self._parameters.same_flow
+            for X in (np.eye(4), *others)
+        )
 
     def sharpened(
         self, motion: NDArray, costs: Costs, whole: NDArray[np.intp]
