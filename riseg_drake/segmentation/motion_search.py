@@ -23,7 +23,6 @@ from riseg_drake.segmentation.alignment import AlignmentParameters, rigid_fit
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.likelihood import EXPECTED, Costs, LikelihoodParameters, motion_costs
 from riseg_drake.segmentation.motions import flow_difference
-from riseg_drake.segmentation.partition import PartitionParameters, partition
 
 
 @dataclass
@@ -67,13 +66,13 @@ def search_motions(
     keyframe: Keyframe,
     frame: Frame,
     above: AboveTable,
-    bond: NDArray[np.float64],
+    part: NDArray[np.intp],
     proposed_K: NDArray[np.float64],
     depth_noise: float,
     gain_min: float,
     parameters: MotionSearchParameters,
     likelihood: LikelihoodParameters,
-    parts: PartitionParameters,
+    area_min: float,
 ) -> NDArray[np.float64]:
     """Motions [C, 4, 4] in the keyframe's camera that explain what standing still does not.
 
@@ -81,57 +80,56 @@ def search_motions(
         keyframe: at the rest before.
         frame: at the rest after.
         above: objMask of that frame.
-        bond: [M], log-odds of the keyframe's borders.
+        part: [N], 0.., which superpixels are one body so far.
         proposed_K: [G, 4, 4], what was seen in motion; taken where it explains what nothing found does.
         depth_noise: standard deviation of depth at 1 m, m.
         gain_min: nats that a motion must bring.
         parameters: see there.
         likelihood: see there.
-        parts: what is large enough for a body.
+        area_min: m^2; what is large enough for a body.
     """
     search = _Search(keyframe, frame, above, depth_noise, parameters, likelihood)
     costs = motion_costs(keyframe, frame, np.eye(4)[None], depth_noise, likelihood)
     asked = costs.witnesses > likelihood.correlated_pixels
     tried = np.zeros(keyframe.count, bool)
-    whole = partition(keyframe, bond, parts)
-    whole_tried = np.zeros(int(whole.max(initial=-1)) + 1, bool)
-    area_min = parts.area_min * keyframe.pixels_per_metre**2
+    part_tried = np.zeros(int(part.max(initial=-1)) + 1, bool)
+    pixels_min = area_min * keyframe.pixels_per_metre**2
     found: list[NDArray] = []
     for _ in range(parameters.rounds):
         unexplained = (costs.misfit.min(0) > parameters.unexplained) & asked
         patch, distance = search.densest_patch(unexplained & ~tried)
-        if keyframe.area[patch].sum() < 0.2 * area_min:
-            # Each piece of a blank surface may be explained, by one motion or another, and all of it by none.
-            short = unexplained_wholes(costs.nats(likelihood), whole) * ~whole_tried
+        if keyframe.area[patch].sum() < 0.2 * pixels_min:
+            # Each superpixel of a blank surface may be explained, by one motion or another, and all of it by none.
+            short = unexplained_parts(costs.nats(likelihood), part) * ~part_tried
             if not len(short) or short.max() < gain_min:
                 break
-            patch = whole == short.argmax()
-            whole_tried[short.argmax()] = True
+            patch = part == short.argmax()
+            part_tried[short.argmax()] = True
             distance = np.where(patch, 0.0, np.inf)
         tried |= patch & unexplained
-        best = search.best_motion(patch, distance, costs, whole)
+        best = search.best_motion(patch, distance, costs, part)
         if best is not None and best[0] >= gain_min and search.differs(best[1], found, patch):
             found.append(best[1])
             costs = costs.with_motion(best[2])
             # What it did not explain may be tried with other neighbours.
             tried &= costs.misfit.min(0) > parameters.unexplained
     for motion in proposed_K:
-        gain, motion, own = search.sharpened(motion, costs, whole)
+        gain, motion, own = search.sharpened(motion, costs, part)
         if gain >= gain_min and search.differs(motion, found, np.zeros(keyframe.count, bool)):
             found.append(motion)
             costs = costs.with_motion(own)
     return np.array(found).reshape(-1, 4, 4)
 
 
-def unexplained_wholes(nats: NDArray[np.float64], whole: NDArray[np.intp]) -> NDArray[np.float64]:
-    """[W], nats by which the one motion that explains a whole best falls short of the best of each piece.
+def unexplained_parts(nats: NDArray[np.float64], part: NDArray[np.intp]) -> NDArray[np.float64]:
+    """[P], nats by which the one motion that explains a part best falls short of the best of each superpixel.
 
     Args:
-        nats: [G, N], how much worse than the best each motion explains each piece.
-        whole: [N], the whole 0..W-1 that each piece is part of.
+        nats: [G, N], how much worse than the best each motion explains each superpixel.
+        part: [N], 0.., of each superpixel.
     """
-    count = int(whole.max(initial=-1)) + 1
-    return np.min([np.bincount(whole, n, count) for n in nats], axis=0)
+    count = int(part.max(initial=-1)) + 1
+    return np.min([np.bincount(part, n, count) for n in nats], axis=0)
 
 
 class _Search:
@@ -175,7 +173,7 @@ class _Search:
         return among & (distance < self._parameters.patch), distance
 
     def best_motion(
-        self, patch: NDArray[np.bool_], distance: NDArray[np.float64], costs: Costs, whole: NDArray[np.intp]
+        self, patch: NDArray[np.bool_], distance: NDArray[np.float64], costs: Costs, part: NDArray[np.intp]
     ) -> tuple[float, NDArray, Costs] | None:
         """What a patch [N] did: the gain, nats, the motion [4, 4], and its costs."""
         best_known = costs.misfit.min(0)
@@ -196,7 +194,7 @@ class _Search:
                 fitted, alignment = self._keyframe.edges.subset(edges), self._parameters.alignment
                 motion, _ = self._fit.align(fitted, motion, alignment.rounds, alignment)
             own = self._costs(motion)
-            results.append((self._gain(own, costs, whole), motion, own))
+            results.append((self._gain(own, costs, part), motion, own))
         return max(results, key=lambda result: result[0]) if results else None
 
     def differs(self, motion: NDArray, others: Sequence[NDArray], patch: NDArray[np.bool_]) -> bool:
@@ -210,7 +208,7 @@ class _Search:
         )
 
     def sharpened(
-        self, motion: NDArray, costs: Costs, whole: NDArray[np.intp]
+        self, motion: NDArray, costs: Costs, part: NDArray[np.intp]
     ) -> tuple[float, NDArray, Costs]:
         """A proposed motion [4, 4], made to fit what it explains: the gain, nats, the motion, and its costs."""
         mine = self._costs(motion).misfit[0]
@@ -220,14 +218,14 @@ class _Search:
             alignment = self._parameters.alignment
             motion, _ = self._fit.align(self._keyframe.edges.subset(edges), motion, alignment.rounds, alignment)
         own = self._costs(motion)
-        return self._gain(own, costs, whole), motion, own
+        return self._gain(own, costs, part), motion, own
 
-    def _gain(self, own: Costs, costs: Costs, whole: NDArray[np.intp]) -> float:
-        """Nats by which a motion explains wholes better, or pieces of them."""
+    def _gain(self, own: Costs, costs: Costs, part: NDArray[np.intp]) -> float:
+        """Nats by which a motion explains a part better, or superpixels wherever they are."""
         nats = costs.with_motion(own).nats(self._likelihood)
         better = np.clip(nats[:-1].min(0) - nats[-1], 0, None)
-        of_wholes = unexplained_wholes(nats[:-1], whole) - unexplained_wholes(nats, whole)
-        return float(max(better[own.misfit[0] < self._parameters.unexplained + 1].sum(), of_wholes.max(initial=0)))
+        of_parts = unexplained_parts(nats[:-1], part) - unexplained_parts(nats, part)
+        return float(max(better[own.misfit[0] < self._parameters.unexplained + 1].sum(), of_parts.max(initial=0)))
 
     def _costs(self, motion: NDArray) -> Costs:
         return motion_costs(self._keyframe, self._frame, motion[None], self._depth_noise, self._likelihood)
@@ -285,11 +283,13 @@ class _Search:
 
     def _places(self, p_KQ: NDArray, motions: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Where points [S, 3] appear in the frame after motions [H, 4, 4]: u, v, pixels, and depth, m, [H, S]."""
-        k, frame = self._frame.intrinsics, self._frame
-        X = (inverse(frame.X_WC) @ self._keyframe.frame.X_WC @ motions).astype(np.float32)
-        p_C1Q = np.einsum("hij,nj->hni", X[:, :3, :3], p_KQ.astype(np.float32)) + X[:, None, :3, 3]
-        z = p_C1Q[..., 2]
-        u, v = k.fx * p_C1Q[..., 0] / z + np.float32(k.cx), k.fy * p_C1Q[..., 1] / z + np.float32(k.cy)
+        frame = self._frame
+        k = frame.intrinsics
+        K = np.array([[k.fx, 0, k.cx], [0, k.fy, k.cy], [0, 0, 1]])
+        P = (K @ (inverse(frame.X_WC) @ self._keyframe.frame.X_WC @ motions)[:, :3]).astype(np.float32)
+        homogeneous = np.column_stack([p_KQ, np.ones(len(p_KQ))]).astype(np.float32)
+        zu, zv, z = np.moveaxis((P.reshape(-1, 4) @ homogeneous.T).reshape(len(P), 3, -1), 1, 0)
+        u, v = zu / z, zv / z
         return u, v, z
 
     def _blurred(self, image: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -165,7 +165,7 @@ def segment_by_evidence(
     if deciding:
         candidates_K = _searched(belief, frame, above_1, candidates_K, depth_noise, parameters)
     if len(candidates_K):
-        seen = observe(belief.keyframe, frame, belief.bond, candidates_K, depth_noise, parameters.observation)
+        seen = observe(belief.keyframe, frame, belief.bond, belief.part, candidates_K, depth_noise, parameters.observation)
         bodies = bodies_of(belief, seen, bodies, parameters.belief)
     return _carried(now, pair, above_1, seen, bodies, deciding, parameters, bfif)
 
@@ -216,13 +216,13 @@ def _searched(
         belief.keyframe,
         frame,
         above,
-        belief.bond,
+        belief.part,
         candidates_K,
         depth_noise,
         parameters.observation.motion_cost,
         parameters.search,
         parameters.observation.likelihood,
-        parameters.belief.partition,
+        parameters.belief.partition.area_min,
     )
 
 
