@@ -16,6 +16,7 @@ from riseg_drake.segmentation.observation import Observation
 from riseg_drake.segmentation.partition import PartitionParameters, partition, with_ids
 from riseg_drake.segmentation.propagation import carry_labels
 
+
 @dataclass
 class BeliefParameters:
     """How evidence is kept."""
@@ -98,7 +99,8 @@ def bodies_of(belief: Belief, seen: Observation, before: Bodies | None, paramete
     found_before = np.bincount(part, keyframe.area * (belief.body > 0), count)
     moved = (motion > 0) | (2 * found_before > np.bincount(part, keyframe.area, count))
     previous = [belief.body] if before is None else [belief.body, before.body]
-    next_id = belief.next_id if before is None else before.next_id
+    # What was found in motion and is gone leaves no gap in the numbers.
+    next_id = max(belief.next_id, 0 if before is None else int(before.body.max(initial=0)) + 1)
     body, next_id = with_ids(part, moved, keyframe.area, previous, next_id)
     return Bodies(body, motion[part], seen.motions_K, next_id)
 

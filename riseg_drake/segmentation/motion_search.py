@@ -207,9 +207,7 @@ class _Search:
             for X in (np.eye(4), *others)
         )
 
-    def sharpened(
-        self, motion: NDArray, costs: Costs, part: NDArray[np.intp]
-    ) -> tuple[float, NDArray, Costs]:
+    def sharpened(self, motion: NDArray, costs: Costs, part: NDArray[np.intp]) -> tuple[float, NDArray, Costs]:
         """A proposed motion [4, 4], made to fit what it explains: the gain, nats, the motion, and its costs."""
         mine = self._costs(motion).misfit[0]
         members = (mine < self._parameters.unexplained + 1) & (mine < costs.misfit.min(0) - 0.3)
@@ -225,7 +223,9 @@ class _Search:
         nats = costs.with_motion(own).nats(self._likelihood)
         better = np.clip(nats[:-1].min(0) - nats[-1], 0, None)
         of_parts = unexplained_parts(nats[:-1], part) - unexplained_parts(nats, part)
-        return float(max(better[own.misfit[0] < self._parameters.unexplained + 1].sum(), of_parts.max(initial=0)))
+        return float(
+            max(better[own.misfit[0] < self._parameters.unexplained + 1].sum(), of_parts.max(initial=0))
+        )
 
     def _costs(self, motion: NDArray) -> Costs:
         return motion_costs(self._keyframe, self._frame, motion[None], self._depth_noise, self._likelihood)
@@ -256,7 +256,9 @@ class _Search:
         """Points [S, 3] at a patch's height in the free space beside it, which moves with it."""
         keyframe = self._keyframe
         own = keyframe.image_of(patch).view(np.uint8)
-        ring = cv2.dilate(own, _RING) & ~cv2.dilate(keyframe.above.mask.view(np.uint8), np.ones((3, 3), np.uint8))
+        ring = cv2.dilate(own, _RING) & ~cv2.dilate(
+            keyframe.above.mask.view(np.uint8), np.ones((3, 3), np.uint8)
+        )
         v, u = np.nonzero(ring & (keyframe.frame.depth > 0))
         some = np.sort(self._rng.permutation(len(v))[:samples])
         n = self._normal / np.linalg.norm(self._normal)

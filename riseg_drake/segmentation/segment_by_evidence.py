@@ -52,6 +52,9 @@ class EvidenceParameters:
     in_view: float = 0.9
     """Share of what the keyframe shows that a picture must show, too, to decide: a rest of the arm just after a
     push sees little."""
+    span: float = 15.0
+    """Pixels that something has moved since the keyframe, from which what is seen in motion decides, too: hands
+    do not rest."""
     uncovered: float = 0.3
     """Share of what stands there that the keyframe does not show, from which the view needs another."""
     memory: bool = True
@@ -162,10 +165,21 @@ def segment_by_evidence(
         )
     )
     depth_noise = max(above_1.depth_noise, belief.keyframe.above.depth_noise)
+    if len(candidates_K) and not deciding:
+        seen = observe(
+            belief.keyframe, frame, belief.bond, belief.part, candidates_K, depth_noise, parameters.observation
+        )
+        bodies = bodies_of(belief, seen, bodies, parameters.belief)
+        deciding = (
+            _has_gone_far(belief, seen, bodies, parameters)
+            and _share_in_view(belief, bodies, frame) > parameters.in_view
+        )
     if deciding:
         candidates_K = _searched(belief, frame, above_1, candidates_K, depth_noise, parameters)
-    if len(candidates_K):
-        seen = observe(belief.keyframe, frame, belief.bond, belief.part, candidates_K, depth_noise, parameters.observation)
+    if len(candidates_K) and deciding:
+        seen = observe(
+            belief.keyframe, frame, belief.bond, belief.part, candidates_K, depth_noise, parameters.observation
+        )
         bodies = bodies_of(belief, seen, bodies, parameters.belief)
     return _carried(now, pair, above_1, seen, bodies, deciding, parameters, bfif)
 
@@ -264,6 +278,13 @@ def _carried(
     return replace(
         now, margin=margin, belief=following, bodies={}, memory=memory, decided=now.decided or deciding
     )
+
+
+def _has_gone_far(belief: Belief, seen: Observation, bodies: Bodies, parameters: EvidenceParameters) -> bool:
+    """Whether something as large as a body has moved by many pixels since the keyframe."""
+    keyframe, area_min = belief.keyframe, parameters.belief.partition.area_min
+    far = (bodies.motion > 0) & (seen.span > parameters.span)
+    return bool(keyframe.area[far].sum() > area_min * keyframe.pixels_per_metre**2)
 
 
 def _share_in_view(belief: Belief, bodies: Bodies, frame: Frame) -> float:
