@@ -13,7 +13,12 @@ from riseg_drake.segmentation.border_prior import BorderPriorParameters, border_
 from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe
 from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.observation import Observation
-from riseg_drake.segmentation.partition import PartitionParameters, partition, with_ids
+from riseg_drake.segmentation.partition import (
+    PartitionParameters,
+    motions_of_parts,
+    partition,
+    with_ids,
+)
 from riseg_drake.segmentation.propagation import carry_labels
 
 
@@ -91,13 +96,9 @@ def bodies_of(belief: Belief, seen: Observation, before: Bodies | None, paramete
     the frame before."""
     keyframe = belief.keyframe
     part = partition(keyframe, belief.bond + seen.evidence, parameters.partition)
-    count = int(part.max(initial=-1)) + 1
-    # A body is rigid: it has the motion that explains all of it best, and to move at all must explain much.
-    worse = np.array([np.bincount(part, nats, count) for nats in seen.nats])
-    worse[1:] += parameters.partition.moved_min
-    motion = worse.argmin(0)
-    found_before = np.bincount(part, keyframe.area * (belief.body > 0), count)
-    moved = (motion > 0) | (2 * found_before > np.bincount(part, keyframe.area, count))
+    motion = motions_of_parts(part, seen.nats, parameters.partition)
+    found_before = np.bincount(part, keyframe.area * (belief.body > 0), len(motion))
+    moved = (motion > 0) | (2 * found_before > np.bincount(part, keyframe.area, len(motion)))
     previous = [belief.body] if before is None else [belief.body, before.body]
     # What was found in motion and is gone leaves no gap in the numbers.
     next_id = max(belief.next_id, 0 if before is None else int(before.body.max(initial=0)) + 1)

@@ -99,7 +99,7 @@ def search_motions(
         unexplained = (costs.misfit.min(0) > parameters.unexplained) & asked
         patch, distance = search.densest_patch(unexplained & ~tried)
         if keyframe.area[patch].sum() < 0.2 * pixels_min:
-            # Each superpixel of a blank surface may be explained, by one motion or another, and all of it by none.
+            # Each superpixel of a blank surface may be explained, by one motion or another, all of it by none.
             short = unexplained_parts(costs.nats(likelihood), part) * ~part_tried
             if not len(short) or short.max() < gain_min:
                 break
@@ -195,7 +195,9 @@ class _Search:
                 motion, _ = self._fit.align(fitted, motion, alignment.rounds, alignment)
             own = self._costs(motion)
             results.append((self._gain(own, costs, part), motion, own))
-        return max(results, key=lambda result: result[0]) if results else None
+        # Gains end where noise begins; among those that are alike the patch itself tells.
+        weight = costs.witnesses * patch / (2 * self._likelihood.correlated_pixels)
+        return max(results, key=lambda r: r[0] - float(weight @ r[2].misfit[0]), default=None)
 
     def differs(self, motion: NDArray, others: Sequence[NDArray], patch: NDArray[np.bool_]) -> bool:
         """Whether a motion takes a patch elsewhere than standing still and others [4, 4] do."""
@@ -266,7 +268,7 @@ class _Search:
         return r * (np.median(p_KQ @ n) / (r @ n))[:, None]
 
     def _taken(self, p_KQ: NDArray, motions: NDArray) -> NDArray:
-        """How much of free points [S, 3] is no longer free after motions [H, 4, 4], in squared residuals [H]."""
+        """How many of free points [S, 3] motions [H, 4, 4] take where it is not free, in squared residuals."""
         u, v, _ = self._places(p_KQ, motions)
         taken = cv2.remap(self._standing, u, v, cv2.INTER_LINEAR, borderValue=0)
         return self._likelihood.residual_max * taken.mean(1)
@@ -284,7 +286,7 @@ class _Search:
         return cost.mean(1)
 
     def _places(self, p_KQ: NDArray, motions: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-        """Where points [S, 3] appear in the frame after motions [H, 4, 4]: u, v, pixels, and depth, m, [H, S]."""
+        """Where motions [H, 4, 4] take points [S, 3] in the frame: u, v, pixels, and depth, m, [H, S]."""
         frame = self._frame
         k = frame.intrinsics
         K = np.array([[k.fx, 0, k.cx], [0, k.fy, k.cy], [0, 0, 1]])

@@ -33,6 +33,22 @@ def partition(
     )
 
 
+def motions_of_parts(
+    part: NDArray[np.intp], nats: NDArray[np.float64], parameters: PartitionParameters
+) -> NDArray[np.intp]:
+    """Which motion 0..G-1 each part [P] has: a body is rigid, so the one that explains all of it best.
+
+    Args:
+        part: [N], 0.., part of each superpixel.
+        nats: [G, N], how badly each motion explains each superpixel; the first is standing still.
+        parameters: see there.
+    """
+    count = int(part.max(initial=-1)) + 1
+    worse = np.array([np.bincount(part, n, count) for n in nats])
+    worse[1:] += parameters.moved_min
+    return worse.argmin(0)
+
+
 def with_ids(
     part: NDArray[np.intp],
     moved: NDArray[np.bool_],

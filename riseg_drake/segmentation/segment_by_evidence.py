@@ -30,6 +30,7 @@ from riseg_drake.segmentation.belief import (
 )
 from riseg_drake.segmentation.bfif import BFIFParameters
 from riseg_drake.segmentation.candidates import candidate_motions
+from riseg_drake.segmentation.frame_pairs import camera_span
 from riseg_drake.segmentation.memory import Memory, draw_memory, moved_memory, remember
 from riseg_drake.segmentation.motion_search import MotionSearchParameters, search_motions
 from riseg_drake.segmentation.motions import BFIFGroups
@@ -170,10 +171,7 @@ def segment_by_evidence(
             belief.keyframe, frame, belief.bond, belief.part, candidates_K, depth_noise, parameters.observation
         )
         bodies = bodies_of(belief, seen, bodies, parameters.belief)
-        deciding = (
-            _has_gone_far(belief, seen, bodies, parameters)
-            and _share_in_view(belief, bodies, frame) > parameters.in_view
-        )
+        deciding = _has_gone_far(belief, frame, seen, bodies, parameters)
     if deciding:
         candidates_K = _searched(belief, frame, above_1, candidates_K, depth_noise, parameters)
     if len(candidates_K) and deciding:
@@ -280,9 +278,14 @@ def _carried(
     )
 
 
-def _has_gone_far(belief: Belief, seen: Observation, bodies: Bodies, parameters: EvidenceParameters) -> bool:
-    """Whether something as large as a body has moved by many pixels since the keyframe."""
+def _has_gone_far(
+    belief: Belief, frame: Frame, seen: Observation, bodies: Bodies, parameters: EvidenceParameters
+) -> bool:
+    """Whether something as large as a body has moved by many pixels since the keyframe, before a camera that
+    stands as it stood then: one that moves with the arm will see better at the next rest."""
     keyframe, area_min = belief.keyframe, parameters.belief.partition.area_min
+    if camera_span(keyframe.frame, frame) > parameters.rest.camera_span:
+        return False
     far = (bodies.motion > 0) & (seen.span > parameters.span)
     return bool(keyframe.area[far].sum() > area_min * keyframe.pixels_per_metre**2)
 
@@ -298,7 +301,7 @@ def _share_in_view(belief: Belief, bodies: Bodies, frame: Frame) -> float:
     for k, X in enumerate(bodies.motions_K):
         p_CQ = move_points(inverse(frame.X_WC) @ keyframe.frame.X_WC @ X, p_KQ[motion == k].astype(float))
         (v, u), inside = (a.T for a in pixels_of(p_CQ, frame.intrinsics))
-        shown += np.count_nonzero(frame.unhidden_depth[v[inside], u[inside]] > 0)
+        shown += int(np.count_nonzero(frame.unhidden_depth[v[inside], u[inside]] > 0))
     return shown / max(1, len(p_KQ))
 
 

@@ -6,7 +6,7 @@ import pytest
 from riseg_drake.segmentation.partition import (
     PartitionParameters,
     margins,
-    moved_parts,
+    motions_of_parts,
     partition,
     with_ids,
 )
@@ -48,9 +48,23 @@ def test_small_parts_grow_until_they_are_large_enough():
     assert part.max() == 0
 
 
-def test_two_sure_superpixels_make_a_part_one_that_has_moved():
-    moved = moved_parts(np.array([0, 0, 0, 1, 1]), np.array([4.0, 4.1, 0.0, 4.0, 3.9]), PartitionParameters())
-    np.testing.assert_array_equal(moved, [True, False])
+def test_a_part_moves_where_two_sure_superpixels_say_so():
+    nats = np.array([[4.0, 4.1, 0.0, 4.0, 3.9], [0.0] * 5])
+    motion = motions_of_parts(np.array([0, 0, 0, 1, 1]), nats, PartitionParameters())
+    np.testing.assert_array_equal(motion, [1, 0])
+
+
+def test_a_part_has_the_one_motion_that_explains_all_of_it():
+    # Each superpixel has a motion that explains it, the second to one half, the third to the other; the fourth
+    # explains none best and all well: 3 + 3 + 3 against 4 + 4 + 0 and 0 + 0 + 40.
+    nats = np.array([[20.0, 20.0, 20.0], [0.0, 0.0, 40.0], [40.0, 40.0, 0.0], [3.0, 3.0, 3.0]])
+    assert motions_of_parts(np.zeros(3, int), nats, PartitionParameters()) == [3]
+
+
+def test_blank_superpixels_do_not_outvote_those_that_saw_it_move():
+    nats = np.zeros((2, 103))
+    nats[0, :3] = 4.0
+    assert motions_of_parts(np.zeros(103, int), nats, PartitionParameters()) == [1]
 
 
 def test_the_larger_part_of_what_was_one_keeps_its_id():
