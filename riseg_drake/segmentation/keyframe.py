@@ -93,7 +93,7 @@ def make_keyframe(
     size = max(3, round(parameters.superpixel * above.pixels_per_metre(frame.intrinsics)))
     cut = superpixels(frame.color[region], above.height[region], above.mask[region], size)
     if bodies is not None:
-        cut = split_superpixels(cut, bodies[region], frame.color[region], above.height[region])
+        cut = split_superpixels(cut, bodies[region])
     owner = np.full(above.mask.shape, -1, np.intp)
     owner[region] = cut.label
     variance = gray_variance(frame.gray, noise)
@@ -110,5 +110,5 @@ def make_keyframe(
         owner=owner[v, u],
         gray=frame.gray[v, u],
         variance=variance[v, u],
-        edges=edge_pixels(frame, owner, has_contrast(variance, noise), variance, [], parameters.edge_pixels),
+        edges=edge_pixels(frame, owner, has_contrast(variance, noise), variance, parameters.edge_pixels),
     )
