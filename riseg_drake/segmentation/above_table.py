@@ -94,7 +94,9 @@ def objects_above_table(frame: Frame, parameters: AboveTableParameters) -> Above
         high &= belonging
     z = frame.depth[high]
     distance = float(np.median(z)) if len(z) else 1.0
-    mask = _without_specks(high, clearly, frame, on_table, parameters.area_min / distance**2)
+    with np.errstate(invalid="ignore"):
+        raised = height > 0.5 * parameters.height_min
+    mask = _without_specks(high, raised, clearly, frame, on_table, parameters.area_min / distance**2)
     return AboveTable(mask, height, transform_plane(frame.X_WC, plane_C), depth_noise, distance)
 
 
@@ -149,13 +151,15 @@ def _looks_like_table(color: NDArray[np.uint8], frame: Frame, on_table: NDArray[
 
 def _without_specks(
     mask: NDArray[np.bool_],
+    raised: NDArray[np.bool_],
     clearly: NDArray[np.bool_] | None,
     frame: Frame,
     on_table: NDArray[np.bool_],
     area_min: float,
 ) -> NDArray[np.bool_]:
-    """Close pinholes, add the rim and the holes without depth, drop pieces that look smaller than `area_min`
-    (m^2 at 1 m), or of which less than that rises clearly."""
+    """Close pinholes, add the rim and what is enclosed without depth or `raised` above the table (low things
+    have pixels that noise makes lower), drop pieces that look smaller than `area_min` (m^2 at 1 m), or of
+    which less than that rises clearly."""
     out = np.zeros_like(mask)
     if not mask.any():
         return out
@@ -166,7 +170,7 @@ def _without_specks(
     # are the object's, where the table has a colour of its own.
     rim = np.nonzero((cv2.dilate(closed, np.ones((3, 3), np.uint8)) > closed) & (depth == 0))
     closed[rim] = ~_looks_like_table(color[rim], frame, on_table)
-    closed |= _enclosed((depth == 0) & (closed == 0), closed)
+    closed |= _enclosed(((depth == 0) | raised[region]) & (closed == 0), closed)
     np.copyto(closed, 0, where=robot)
     number, label, stats, _ = cv2.connectedComponentsWithStats(closed, connectivity=4)
     pixels_min = area_min * frame.intrinsics.fx * frame.intrinsics.fy

@@ -16,6 +16,7 @@ from riseg_drake.segmentation.partition import PartitionParameters, partition, w
 from riseg_drake.segmentation.propagation import UNKNOWN, carry_labels
 
 
+
 @dataclass
 class BeliefParameters:
     """How evidence is kept."""
@@ -41,6 +42,8 @@ class Belief(Immutable):
     body: NDArray[np.intp]
     """[N], ids; 0 where nothing has moved yet."""
     next_id: int
+    part: NDArray[np.intp]
+    """[N], 0.., which superpixels are one body by all that is known: what has not moved, too."""
 
     @property
     def bond(self) -> NDArray[np.float64]:
@@ -66,12 +69,14 @@ def first_belief(
 ) -> Belief:
     """Nothing has moved yet."""
     keyframe = make_keyframe(frame, above, noise, parameters.keyframe)
+    prior = border_prior(keyframe, parameters.prior)
     return Belief(
         keyframe=keyframe,
-        prior=border_prior(keyframe, parameters.prior),
+        prior=prior,
         evidence=np.zeros(len(keyframe.borders)),
         body=np.zeros(keyframe.count, np.intp),
         next_id=1,
+        part=partition(keyframe, prior, parameters.partition),
     )
 
 
@@ -94,7 +99,8 @@ def bodies_of(belief: Belief, seen: Observation, before: Bodies | None, paramete
     found_before = np.bincount(part, keyframe.area * (belief.body > 0), count)
     moved = (motion > 0) | (2 * found_before > np.bincount(part, keyframe.area, count))
     previous = [belief.body] if before is None else [belief.body, before.body]
-    next_id = belief.next_id if before is None else before.next_id
+    # What was found in motion and is gone leaves no gap in the numbers.
+    next_id = max(belief.next_id, 0 if before is None else int(before.body.max(initial=0)) + 1)
     body, next_id = with_ids(part, moved, keyframe.area, previous, next_id)
     return Bodies(body, motion[part], seen.motions_K, next_id)
 
@@ -107,12 +113,17 @@ def carry_bodies(
     `remembered` [H, W] has ids where things that the keyframe does not see should be now.
     """
     # One label for each body and motion, then one for each remembered id.
-    rigid, label = np.unique(np.stack([bodies.body, bodies.motion]), axis=1, return_inverse=True)
-    hidden, number = np.unique(remembered, return_inverse=True)
+    motions = len(bodies.motions_K)
+    code, label = np.unique(bodies.body * motions + bodies.motion, return_inverse=True)
+    rigid = np.stack(np.divmod(code, motions))
+    hidden = np.flatnonzero(np.bincount(remembered.ravel()))
+    number_of = np.zeros(int(hidden.max(initial=0)) + 1, np.uint16)
+    number_of[hidden] = np.arange(len(hidden)) + 1 + len(code)
+    number_of[0] = 0
+    number = number_of[remembered]
     ids = np.concatenate([[0], np.where(rigid[0] > 0, rigid[0], UNKNOWN), hidden]).astype(np.uint16)
-    number = np.where(remembered > 0, number.reshape(remembered.shape) + 1 + rigid.shape[1], 0)
     moves = {i + 1: bodies.motions_K[g] for i, g in enumerate(rigid[1]) if g > 0}
-    carried = _carry(belief, label.ravel() + 1, moves, frame, above, number)
+    carried = _carry(belief, label + 1, moves, frame, above, number)
     return np.where(carried == UNKNOWN, UNKNOWN, ids[np.where(carried == UNKNOWN, 0, carried)])
 
 
@@ -144,12 +155,14 @@ def next_belief(
         evidence = np.clip(evidence + seen.evidence, -parameters.most, parameters.most)
     body = np.where(known, bodies.body[source], _most_seen(new, np.where(carried == 0, ids, 0)))
     prior = border_prior(new, parameters.prior)
+    evidence = _carried_evidence(old, belief.prior, evidence, new, prior, source, body, parameters)
     return Belief(
         keyframe=new,
         prior=prior,
-        evidence=_carried_evidence(old, belief.prior, evidence, new, prior, source, body, parameters),
+        evidence=evidence,
         body=body,
         next_id=bodies.next_id,
+        part=partition(new, prior + evidence, parameters.partition),
     )
 
 

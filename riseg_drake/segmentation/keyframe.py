@@ -48,6 +48,8 @@ class Keyframe(Immutable):
     """[W], of each witness."""
     variance: NDArray[np.float32]
     """[W], of the difference between that and where it should reappear."""
+    gradient_squared: NDArray[np.float32]
+    """[W], of the gray value, squared gray levels a squared pixel."""
     edges: EdgePixels
     """What sharpens motions; their `piece` is the superpixel."""
 
@@ -110,5 +112,6 @@ def make_keyframe(
         owner=owner[v, u],
         gray=frame.gray[v, u],
         variance=variance[v, u],
+        gradient_squared=(variance[v, u] - np.float32(2 * noise.color**2)) / np.float32(noise.registration**2),
         edges=edge_pixels(frame, owner, has_contrast(variance, noise), variance, parameters.edge_pixels),
     )

@@ -12,11 +12,14 @@ from numpy.typing import NDArray
 
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.geometry.se3 import inverse
+from riseg_drake.segmentation.frame_pairs import camera_span
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.lighting import gray_costs
 from riseg_drake.segmentation.noise import depth_sigma
 from riseg_drake.segmentation.surface import seek
 
+_ANOTHER_VIEW = 100.0
+"""Pixels of the camera's motion from which smooth errors of depth are others."""
 EXPECTED = 2.0
 """Squared residuals of gray and depth, both, where a motion is right."""
 
@@ -33,6 +36,9 @@ class LikelihoodParameters:
     """Noise of depth and gray is correlated over about so many pixels; they count as one."""
     chance: float = 1.5
     """Times the mean squared residual that is usual, up to which a superpixel's may be by chance."""
+    view_error: float = 0.01
+    """Share of the camera's motion, pixels, and of depth from another view, by which what stands still seems to
+    have moved: poses err, and depth errs smoothly by the view (a per cent and more on real films)."""
     superpixel_max: float = 4.0
     """Nats that one superpixel may say for a motion against another: its errors are its own."""
 
@@ -77,7 +83,11 @@ def motion_costs(
     """
     X_C1K = inverse(frame.X_WC) @ keyframe.frame.X_WC
     gray_1, depth_1 = frame.unhidden_gray, frame.unhidden_depth
-    per_variance, ceiling = 1 / keyframe.variance, np.float32(parameters.residual_max)
+    ceiling = np.float32(parameters.residual_max)
+    span = camera_span(keyframe.frame, frame)
+    shift = np.float32(parameters.view_error * span)
+    per_variance = 1 / (keyframe.variance + shift**2 * keyframe.gradient_squared)
+    smooth = np.float32(parameters.view_error * min(1.0, span / _ANOTHER_VIEW))
     witnesses = np.bincount(keyframe.owner, minlength=keyframe.count).astype(float)
     misfit = np.full((len(motions_K), keyframe.count), EXPECTED)
     for mean, motion in zip(misfit, motions_K, strict=True):
@@ -92,7 +102,7 @@ def motion_costs(
             parameters.residual_max,
             parameters.relit,
         )
-        sigma = depth_sigma(sought.depth, float(np.sqrt(2)) * depth_noise)
+        sigma = np.hypot(depth_sigma(sought.depth, float(np.sqrt(2)) * depth_noise), smooth * sought.depth)
         geometric = np.minimum(((z_1 - sought.depth) / sigma) ** 2, ceiling)
         both = photometric + np.where(z_1 > 0, geometric, np.float32(1))
         # What cannot be compared speaks neither for nor against: the value expected of a match.

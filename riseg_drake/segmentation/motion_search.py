@@ -6,6 +6,7 @@ are sharpened, on ever more of what they explain. Texture, outline and height al
 found, too.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -17,10 +18,11 @@ from scipy.ndimage import minimum_filter
 from riseg_drake.geometry.camera import rays
 from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.geometry.se3 import inverse, skew
+from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.alignment import AlignmentParameters, rigid_fit
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.likelihood import EXPECTED, Costs, LikelihoodParameters, motion_costs
-from riseg_drake.segmentation.partition import PartitionParameters, partition
+from riseg_drake.segmentation.motions import flow_difference
 
 
 @dataclass
@@ -45,6 +47,8 @@ class MotionSearchParameters:
     """Valleys that are gone down."""
     unexplained: float = 4.0
     """Mean squared residuals from which a superpixel is not explained."""
+    same_flow: float = 1.0
+    """Pixels (root mean square) within which two motions are one, and what moves stands still."""
     rounds: int = 24
     """Patches that are tried at most."""
     alignment: AlignmentParameters = field(
@@ -52,6 +56,8 @@ class MotionSearchParameters:
     )
 
 
+_RING = np.ones((13, 13), np.uint8)
+"""Six pixels around an outline are looked at: what was free there is free where it went."""
 _GROWTH = (1.0, 1.4, 4.0, 50.0)
 """Radii, in those of a patch, within which a motion is sharpened in turn."""
 
@@ -59,70 +65,71 @@ _GROWTH = (1.0, 1.4, 4.0, 50.0)
 def search_motions(
     keyframe: Keyframe,
     frame: Frame,
-    bond: NDArray[np.float64],
+    above: AboveTable,
+    part: NDArray[np.intp],
     proposed_K: NDArray[np.float64],
     depth_noise: float,
     gain_min: float,
     parameters: MotionSearchParameters,
     likelihood: LikelihoodParameters,
-    parts: PartitionParameters,
+    area_min: float,
 ) -> NDArray[np.float64]:
     """Motions [C, 4, 4] in the keyframe's camera that explain what standing still does not.
 
     Args:
         keyframe: at the rest before.
         frame: at the rest after.
-        bond: [M], log-odds of the keyframe's borders.
+        above: objMask of that frame.
+        part: [N], 0.., which superpixels are one body so far.
         proposed_K: [G, 4, 4], what was seen in motion; taken where it explains what nothing found does.
         depth_noise: standard deviation of depth at 1 m, m.
         gain_min: nats that a motion must bring.
         parameters: see there.
         likelihood: see there.
-        parts: what is large enough for a body.
+        area_min: m^2; what is large enough for a body.
     """
-    search = _Search(keyframe, frame, depth_noise, parameters, likelihood)
+    search = _Search(keyframe, frame, above, depth_noise, parameters, likelihood)
     costs = motion_costs(keyframe, frame, np.eye(4)[None], depth_noise, likelihood)
     asked = costs.witnesses > likelihood.correlated_pixels
     tried = np.zeros(keyframe.count, bool)
-    whole = partition(keyframe, bond, parts)
-    whole_tried = np.zeros(int(whole.max(initial=-1)) + 1, bool)
-    area_min = parts.area_min * keyframe.pixels_per_metre**2
+    part_tried = np.zeros(int(part.max(initial=-1)) + 1, bool)
+    pixels_min = area_min * keyframe.pixels_per_metre**2
     found: list[NDArray] = []
     for _ in range(parameters.rounds):
         unexplained = (costs.misfit.min(0) > parameters.unexplained) & asked
         patch, distance = search.densest_patch(unexplained & ~tried)
-        if keyframe.area[patch].sum() < 0.2 * area_min:
-            # Each piece of a blank surface may be explained, by one motion or another, and all of it by none.
-            short = unexplained_wholes(costs.nats(likelihood), whole) * ~whole_tried
+        if keyframe.area[patch].sum() < 0.2 * pixels_min:
+            # Each superpixel of a blank surface may be explained, by one motion or another, and all of it by none.
+            short = unexplained_parts(costs.nats(likelihood), part) * ~part_tried
             if not len(short) or short.max() < gain_min:
                 break
-            patch = whole == short.argmax()
-            whole_tried[short.argmax()] = True
+            patch = part == short.argmax()
+            part_tried[short.argmax()] = True
             distance = np.where(patch, 0.0, np.inf)
         tried |= patch & unexplained
-        best = search.best_motion(patch, distance, costs, whole)
-        if best is not None and best[0] >= gain_min:
+        best = search.best_motion(patch, distance, costs, part)
+        if best is not None and best[0] >= gain_min and search.differs(best[1], found, patch):
             found.append(best[1])
             costs = costs.with_motion(best[2])
             # What it did not explain may be tried with other neighbours.
             tried &= costs.misfit.min(0) > parameters.unexplained
     for motion in proposed_K:
-        gain, motion, own = search.sharpened(motion, costs, whole)
-        if gain >= gain_min:
+        gain, motion, own = search.sharpened(motion, costs, part)
+        if gain >= gain_min and search.differs(motion, found, np.zeros(keyframe.count, bool)):
             found.append(motion)
             costs = costs.with_motion(own)
     return np.array(found).reshape(-1, 4, 4)
 
 
-def unexplained_wholes(nats: NDArray[np.float64], whole: NDArray[np.intp]) -> NDArray[np.float64]:
-    """[W], nats by which the one motion that explains a whole best falls short of the best of each piece.
+def unexplained_parts(nats: NDArray[np.float64], part: NDArray[np.intp]) -> NDArray[np.float64]:
+    """[P], nats by which the one motion that explains a part best falls short of the best of each superpixel.
 
     Args:
-        nats: [G, N], how much worse than the best each motion explains each piece.
-        whole: [N], the whole 0..W-1 that each piece is part of.
+        nats: [G, N], how much worse than the best each motion explains each superpixel.
+        part: [N], 0.., of each superpixel.
     """
-    count = int(whole.max(initial=-1)) + 1
-    return np.min([np.bincount(whole, n, count) for n in nats], axis=0)
+    count = int(part.max(initial=-1)) + 1
+    return np.min([np.bincount(part, n, count) for n in nats], axis=0)
 
 
 class _Search:
@@ -132,6 +139,7 @@ class _Search:
         self,
         keyframe: Keyframe,
         frame: Frame,
+        above: AboveTable,
         depth_noise: float,
         parameters: MotionSearchParameters,
         likelihood: LikelihoodParameters,
@@ -150,6 +158,7 @@ class _Search:
         middle = [np.bincount(label[v, u], x, keyframe.count) / np.maximum(keyframe.area, 1) for x in (v, u)]
         self._middle = np.stack(middle, axis=1) / keyframe.pixels_per_metre
         """[N, 2], m, of each superpixel, about."""
+        self._standing = above.mask.astype(np.float32)
         self._normal = keyframe.frame.X_WC[:3, :3].T @ keyframe.above.plane_W[:3]
 
     def densest_patch(self, among: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
@@ -164,17 +173,19 @@ class _Search:
         return among & (distance < self._parameters.patch), distance
 
     def best_motion(
-        self, patch: NDArray[np.bool_], distance: NDArray[np.float64], costs: Costs, whole: NDArray[np.intp]
+        self, patch: NDArray[np.bool_], distance: NDArray[np.float64], costs: Costs, part: NDArray[np.intp]
     ) -> tuple[float, NDArray, Costs] | None:
         """What a patch [N] did: the gain, nats, the motion [4, 4], and its costs."""
         best_known = costs.misfit.min(0)
+        blank = not np.isfinite(distance).all()
+        samples = self._parameters.samples * (3 if blank else 1)
         results = []
-        for start, better_by in product(self._valleys(patch), (0.3, -np.inf)):
+        for start, better_by in product(self._valleys(patch, samples), (0.3, -np.inf)):
             motion = start
             for radius in _GROWTH:
                 mine = self._costs(motion).misfit[0]
                 explained = (mine < self._parameters.unexplained + 1) & (mine < best_known - better_by)
-                if radius == _GROWTH[0] or not np.isfinite(distance).all():
+                if radius == _GROWTH[0] or blank:
                     explained |= patch
                 members = explained & (distance < radius * self._parameters.patch)
                 edges = np.flatnonzero(members[self._keyframe.edges.piece])
@@ -183,12 +194,20 @@ class _Search:
                 fitted, alignment = self._keyframe.edges.subset(edges), self._parameters.alignment
                 motion, _ = self._fit.align(fitted, motion, alignment.rounds, alignment)
             own = self._costs(motion)
-            results.append((self._gain(own, costs, whole), motion, own))
+            results.append((self._gain(own, costs, part), motion, own))
         return max(results, key=lambda result: result[0]) if results else None
 
-    def sharpened(
-        self, motion: NDArray, costs: Costs, whole: NDArray[np.intp]
-    ) -> tuple[float, NDArray, Costs]:
+    def differs(self, motion: NDArray, others: Sequence[NDArray], patch: NDArray[np.bool_]) -> bool:
+        """Whether a motion takes a patch elsewhere than standing still and others [4, 4] do."""
+        p_KQ = self._keyframe.edges.p_C0Q
+        mine = p_KQ[patch[self._keyframe.edges.piece]]
+        p_KQ, focal_length = mine if len(mine) else p_KQ, self._frame.intrinsics.fx
+        return all(
+            flow_difference(p_KQ, motion, X, focal_length) > self._parameters.same_flow
+            for X in (np.eye(4), *others)
+        )
+
+    def sharpened(self, motion: NDArray, costs: Costs, part: NDArray[np.intp]) -> tuple[float, NDArray, Costs]:
         """A proposed motion [4, 4], made to fit what it explains: the gain, nats, the motion, and its costs."""
         mine = self._costs(motion).misfit[0]
         members = (mine < self._parameters.unexplained + 1) & (mine < costs.misfit.min(0) - 0.3)
@@ -197,43 +216,65 @@ class _Search:
             alignment = self._parameters.alignment
             motion, _ = self._fit.align(self._keyframe.edges.subset(edges), motion, alignment.rounds, alignment)
         own = self._costs(motion)
-        return self._gain(own, costs, whole), motion, own
+        return self._gain(own, costs, part), motion, own
 
-    def _gain(self, own: Costs, costs: Costs, whole: NDArray[np.intp]) -> float:
-        """Nats by which a motion explains wholes better, or pieces of them."""
+    def _gain(self, own: Costs, costs: Costs, part: NDArray[np.intp]) -> float:
+        """Nats by which a motion explains a part better, or superpixels wherever they are."""
         nats = costs.with_motion(own).nats(self._likelihood)
         better = np.clip(nats[:-1].min(0) - nats[-1], 0, None)
-        of_wholes = unexplained_wholes(nats[:-1], whole) - unexplained_wholes(nats, whole)
-        return float(max(better[own.misfit[0] < self._parameters.unexplained + 1].sum(), of_wholes.max(initial=0)))
+        of_parts = unexplained_parts(nats[:-1], part) - unexplained_parts(nats, part)
+        return float(
+            max(better[own.misfit[0] < self._parameters.unexplained + 1].sum(), of_parts.max(initial=0))
+        )
 
     def _costs(self, motion: NDArray) -> Costs:
         return motion_costs(self._keyframe, self._frame, motion[None], self._depth_noise, self._likelihood)
 
-    def _valleys(self, patch: NDArray[np.bool_]) -> list[NDArray]:
+    def _valleys(self, patch: NDArray[np.bool_], samples: int) -> list[NDArray]:
         """The best motions [4, 4] on the grid of slides and turns."""
         parameters, keyframe = self._parameters, self._keyframe
         witness = np.flatnonzero(patch[keyframe.owner])
         if len(witness) < parameters.samples // 3:
             return []
-        witness = np.sort(self._rng.permutation(witness)[: parameters.samples])
+        witness = np.sort(self._rng.permutation(witness)[:samples])
         v, u = keyframe.witnesses.pixel[:, witness]
         p_KQ = rays(self._frame.intrinsics)[v, u] * keyframe.witnesses.depth[witness, None]
+        beside = self._beside(patch, p_KQ, samples // 2)
         shifts = np.arange(-parameters.reach, parameters.reach + 1e-9, parameters.step)
         turns = np.arange(-parameters.turn, parameters.turn + 1e-9, parameters.turn_step)
         grid = np.stack(np.meshgrid(shifts, shifts, turns, indexing="ij"), axis=-1)
         motions = slides(self._normal, p_KQ.mean(0), grid.reshape(-1, 3))
-        cost = self._mean_costs(p_KQ, self._gray_0[v, u], self._variance[v, u], motions).reshape(grid.shape[:3])
+        cost = self._mean_costs(p_KQ, self._gray_0[v, u], self._variance[v, u], motions)
+        if len(beside):
+            cost += self._taken(beside, motions)
+        cost = cost.reshape(grid.shape[:3])
         lowest = np.flatnonzero((cost == minimum_filter(cost, 5)).ravel())
         order = lowest[np.argsort(cost.ravel()[lowest])][: parameters.best]
         return list(motions[order])
 
+    def _beside(self, patch: NDArray[np.bool_], p_KQ: NDArray, samples: int) -> NDArray[np.float64]:
+        """Points [S, 3] at a patch's height in the free space beside it, which moves with it."""
+        keyframe = self._keyframe
+        own = keyframe.image_of(patch).view(np.uint8)
+        ring = cv2.dilate(own, _RING) & ~cv2.dilate(
+            keyframe.above.mask.view(np.uint8), np.ones((3, 3), np.uint8)
+        )
+        v, u = np.nonzero(ring & (keyframe.frame.depth > 0))
+        some = np.sort(self._rng.permutation(len(v))[:samples])
+        n = self._normal / np.linalg.norm(self._normal)
+        r = rays(self._frame.intrinsics)[v[some], u[some]]
+        return r * (np.median(p_KQ @ n) / (r @ n))[:, None]
+
+    def _taken(self, p_KQ: NDArray, motions: NDArray) -> NDArray:
+        """How much of free points [S, 3] is no longer free after motions [H, 4, 4], in squared residuals [H]."""
+        u, v, _ = self._places(p_KQ, motions)
+        taken = cv2.remap(self._standing, u, v, cv2.INTER_LINEAR, borderValue=0)
+        return self._likelihood.residual_max * taken.mean(1)
+
     def _mean_costs(self, p_KQ: NDArray, gray: NDArray, variance: NDArray, motions: NDArray) -> NDArray:
         """Mean squared residuals [H] under motions [H, 4, 4] of S points with gray values and variances."""
-        k, frame = self._frame.intrinsics, self._frame
-        X = (inverse(frame.X_WC) @ self._keyframe.frame.X_WC @ motions).astype(np.float32)
-        p_C1Q = np.einsum("hij,nj->hni", X[:, :3, :3], p_KQ.astype(np.float32)) + X[:, None, :3, 3]
-        z = p_C1Q[..., 2]
-        u, v = k.fx * p_C1Q[..., 0] / z + np.float32(k.cx), k.fy * p_C1Q[..., 1] / z + np.float32(k.cy)
+        frame = self._frame
+        u, v, z = self._places(p_KQ, motions)
         found = cv2.remap(self._gray_1, u, v, cv2.INTER_LINEAR, borderValue=0)
         z_1 = cv2.remap(frame.unhidden_depth, u, v, cv2.INTER_NEAREST, borderValue=0)
         most = self._likelihood.residual_max
@@ -241,6 +282,17 @@ class _Search:
         sigma = np.float32(2 * np.sqrt(2) * self._depth_noise) * z**2
         cost += np.where(z_1 > 0, np.minimum(((z_1 - z) / sigma) ** 2, most), EXPECTED / 2)
         return cost.mean(1)
+
+    def _places(self, p_KQ: NDArray, motions: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        """Where points [S, 3] appear in the frame after motions [H, 4, 4]: u, v, pixels, and depth, m, [H, S]."""
+        frame = self._frame
+        k = frame.intrinsics
+        K = np.array([[k.fx, 0, k.cx], [0, k.fy, k.cy], [0, 0, 1]])
+        P = (K @ (inverse(frame.X_WC) @ self._keyframe.frame.X_WC @ motions)[:, :3]).astype(np.float32)
+        homogeneous = np.column_stack([p_KQ, np.ones(len(p_KQ))]).astype(np.float32)
+        zu, zv, z = np.moveaxis((P.reshape(-1, 4) @ homogeneous.T).reshape(len(P), 3, -1), 1, 0)
+        u, v = zu / z, zv / z
+        return u, v, z
 
     def _blurred(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
         return cv2.GaussianBlur(image, (0, 0), self._parameters.blur)

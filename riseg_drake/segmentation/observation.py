@@ -18,7 +18,6 @@ from riseg_drake.segmentation.alignment import AlignmentParameters, align_motion
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.likelihood import LikelihoodParameters, motion_costs
 from riseg_drake.segmentation.motions import flow_difference
-from riseg_drake.segmentation.partition import PartitionParameters, partition
 from riseg_drake.segmentation.potts import PottsGraph, potts_labels
 
 
@@ -62,6 +61,7 @@ def observe(
     keyframe: Keyframe,
     frame: Frame,
     bond: NDArray[np.float64],
+    part: NDArray[np.intp],
     candidates_K: NDArray[np.float64],
     depth_noise: float,
     parameters: ObservationParameters,
@@ -72,6 +72,7 @@ def observe(
         keyframe: what to explain.
         frame: the frame.
         bond: [M], log-odds of each border so far.
+        part: [N], 0.., which superpixels are one body so far.
         candidates_K: [C, 4, 4], motions since the keyframe, seen from its camera.
         depth_noise: standard deviation of depth at 1 m, m.
         parameters: see there.
@@ -83,7 +84,7 @@ def observe(
     motions_K = np.concatenate([np.eye(4)[None], candidates_K])
     costs = motion_costs(keyframe, frame, motions_K, depth_noise, parameters.likelihood)
     nats = costs.nats(parameters.likelihood)
-    needed, motion = _fewest_motions(nats, keyframe, bond, parameters)
+    needed, motion = _fewest_motions(nats, keyframe, bond, part, parameters)
     nats = nats[needed]
     share = np.bincount(motion, keyframe.area, len(needed)) / max(1, keyframe.area.sum())
     share = np.maximum(share, parameters.outlier)
@@ -125,12 +126,12 @@ def _fewest_motions(
     nats: NDArray[np.float64],
     keyframe: Keyframe,
     bond: NDArray[np.float64],
+    part: NDArray[np.intp],
     parameters: ObservationParameters,
 ) -> tuple[list[int], NDArray[np.intp]]:
     """The motions that are needed, and which of these each superpixel [N] has; drops the others one by one."""
     coupling = parameters.border * np.maximum(bond, parameters.border_least) * keyframe.length
     graph = PottsGraph(keyframe.count, keyframe.borders, coupling)
-    whole = partition(keyframe, bond, PartitionParameters())
     needed, message = list(range(len(nats))), None
     while True:
         unary = nats[needed].astype(np.float32)
@@ -139,9 +140,9 @@ def _fewest_motions(
         gains = []
         for k in range(1, len(needed)):
             mine = nats[np.ix_(needed, motion == k)]
-            # All of a whole, as far as it has this motion, would have another one.
-            others = np.delete(mine, k, axis=0) - mine[k]
-            gains.append(float(np.sum([others[:, whole[motion == k] == w].sum(1).min() for w in np.unique(whole[motion == k])])))
+            # All of a part, as far as it has this motion, would have another one.
+            without, owner = np.delete(mine, k, axis=0) - mine[k], part[motion == k]
+            gains.append(float(np.min([np.bincount(owner, w) for w in without], axis=0).sum()))
         if not gains or min(gains) >= parameters.motion_cost:
             return needed, motion
         dropped = int(np.argmin(gains)) + 1

@@ -48,6 +48,12 @@ class EvidenceParameters:
     belief: BeliefParameters = field(default_factory=BeliefParameters)
     settled: float = 2.0
     """Nats a border by which an object's outline must be better than the next best, not to be in doubt."""
+    in_view: float = 0.9
+    """Share of what the keyframe shows that a picture must show, too, to decide: a rest of the arm just after a
+    push sees little."""
+    span: float = 15.0
+    """Pixels that something has moved since the keyframe, from which what is seen in motion decides, too: hands
+    do not rest."""
     uncovered: float = 0.3
     """Share of what stands there that the keyframe does not show, from which the view needs another."""
     memory: bool = True
@@ -95,12 +101,27 @@ def segment_by_evidence(
         now.still_since is not None
         and not now.decided
         and (frame.time - now.still_since >= parameters.rest.time)
+        and (
+            _share_in_view(belief, bodies, frame) > parameters.in_view
+            or _leaves_keyframe(belief, bodies, frame, above_1, parameters)
+        )
     )
     depth_noise = max(above_1.depth_noise, belief.keyframe.above.depth_noise)
+    if len(candidates_K) and not deciding:
+        seen = observe(
+            belief.keyframe, frame, belief.bond, belief.part, candidates_K, depth_noise, parameters.observation
+        )
+        bodies = bodies_of(belief, seen, bodies, parameters.belief)
+        deciding = (
+            _has_gone_far(belief, seen, bodies, parameters)
+            and _share_in_view(belief, bodies, frame) > parameters.in_view
+        )
     if deciding:
-        candidates_K = _searched(belief, frame, candidates_K, depth_noise, parameters)
-    if len(candidates_K):
-        seen = observe(belief.keyframe, frame, belief.bond, candidates_K, depth_noise, parameters.observation)
+        candidates_K = _searched(belief, frame, above_1, candidates_K, depth_noise, parameters)
+    if len(candidates_K) and deciding:
+        seen = observe(
+            belief.keyframe, frame, belief.bond, belief.part, candidates_K, depth_noise, parameters.observation
+        )
         bodies = bodies_of(belief, seen, bodies, parameters.belief)
     return _carried(now, pair, above_1, seen, bodies, deciding, parameters, bfif)
 
@@ -142,6 +163,7 @@ def _bodies_before(now: Segmentation) -> Bodies:
 def _searched(
     belief: Belief,
     frame: Frame,
+    above: AboveTable,
     candidates_K: NDArray[np.float64],
     depth_noise: float,
     parameters: EvidenceParameters,
@@ -149,13 +171,14 @@ def _searched(
     return search_motions(
         belief.keyframe,
         frame,
-        belief.bond,
+        above,
+        belief.part,
         candidates_K,
         depth_noise,
         parameters.observation.motion_cost,
         parameters.search,
         parameters.observation.likelihood,
-        parameters.belief.partition,
+        parameters.belief.partition.area_min,
     )
 
 
@@ -197,6 +220,28 @@ def _carried(
     return replace(
         now, margin=margin, belief=following, bodies={}, memory=memory, decided=now.decided or deciding
     )
+
+
+def _has_gone_far(belief: Belief, seen: Observation, bodies: Bodies, parameters: EvidenceParameters) -> bool:
+    """Whether something as large as a body has moved by many pixels since the keyframe."""
+    keyframe, area_min = belief.keyframe, parameters.belief.partition.area_min
+    far = (bodies.motion > 0) & (seen.span > parameters.span)
+    return bool(keyframe.area[far].sum() > area_min * keyframe.pixels_per_metre**2)
+
+
+def _share_in_view(belief: Belief, bodies: Bodies, frame: Frame) -> float:
+    """How much of what the keyframe shows this frame shows with depth, where it should be by now."""
+    keyframe = belief.keyframe
+    every = slice(None, None, 1 + len(keyframe.owner) // 2000)
+    v, u = keyframe.witnesses.pixel[:, every]
+    p_KQ = rays(keyframe.frame.intrinsics)[v, u] * keyframe.witnesses.depth[every, None]
+    motion = bodies.motion[keyframe.owner[every]]
+    shown = 0
+    for k, X in enumerate(bodies.motions_K):
+        p_CQ = move_points(inverse(frame.X_WC) @ keyframe.frame.X_WC @ X, p_KQ[motion == k].astype(float))
+        (v, u), inside = (a.T for a in pixels_of(p_CQ, frame.intrinsics))
+        shown += np.count_nonzero(frame.unhidden_depth[v[inside], u[inside]] > 0)
+    return shown / max(1, len(p_KQ))
 
 
 def _leaves_keyframe(
