@@ -16,7 +16,6 @@ from riseg_drake.segmentation.partition import PartitionParameters, partition, w
 from riseg_drake.segmentation.propagation import UNKNOWN, carry_labels
 
 
-
 @dataclass
 class BeliefParameters:
     """How evidence is kept."""

@@ -240,7 +240,7 @@ def _share_in_view(belief: Belief, bodies: Bodies, frame: Frame) -> float:
     for k, X in enumerate(bodies.motions_K):
         p_CQ = move_points(inverse(frame.X_WC) @ keyframe.frame.X_WC @ X, p_KQ[motion == k].astype(float))
         (v, u), inside = (a.T for a in pixels_of(p_CQ, frame.intrinsics))
-        shown += np.count_nonzero(frame.unhidden_depth[v[inside], u[inside]] > 0)
+        shown += int(np.count_nonzero(frame.unhidden_depth[v[inside], u[inside]] > 0))
     return shown / max(1, len(p_KQ))
 
 
