@@ -1,4 +1,5 @@
-"""The literal paper against this project's version: recorded runs segmented again, one switch at a time."""
+"""What each part of Alg. 2 is worth, the paper's own among them: recorded runs segmented again, one switch at a
+time."""
 
 import copy
 import operator
@@ -17,20 +18,30 @@ from riseg_drake.recording.reader import RecordingReader
 from riseg_drake.robot.kinematics import PandaKinematics
 
 Switch = Mapping[str, Any]
-"""Keys of the scenario and what the paper has there."""
+"""Keys of the scenario and what they are set to."""
 
-SWITCHES: dict[str, Switch] = {
+AS_IN_THE_PAPER: dict[str, Switch] = {
     "body frames: triplets, not patches": {"bfif.frames.kind": "triplets"},
     "covariance: of the sample, not propagated": {"bfif.grouping.covariance": "sample"},
     "pair: consecutive frames, not by motion": {"frame_pair.kind": "consecutive"},
-    "outline: growth over similar flow, not by motion": {"segment.outline": "flow"},
-    "propagation: every frame by O_t, not from the reference": {"segment.propagation": "flow"},
-    "association: fresh ids, not by evidence": {"segment.ids": "fresh"},
-    "memory of what left the view: none": {"segment.memory": False},
+    "line 7: to the letter, not by evidence": {"segment.method": "paper"},
 }
 """Where this project departs from the paper, by what the report calls it."""
 
+WITHOUT: dict[str, Switch] = {
+    "no motions proposed by lines 3 to 6": {"bfif.grouping.members_min": 10**6},
+    "no motions searched for at rest": {"segment.evidence.search.rounds": 0},
+    "nothing of borders from the still picture": {
+        f"segment.evidence.belief.prior.{cue}": 0.0 for cue in ("dent", "valley", "color", "hole")
+    },
+    "no evidence kept from one rest to the next": {"segment.evidence.belief.most": 0.0},
+    "no memory of what left the view": {"segment.evidence.memory": False},
+}
+"""What line 7 by evidence consists of, by what is missing."""
+
 LITERAL = "everything as in the paper"
+LITERAL_STEPS = (0.2, 0.5, 1.0, 2.0)
+"""s between t-1 and t, up to a whole push: the paper does not give its time step, so it has every chance."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +55,10 @@ class Ablation:
 
 
 def versions() -> dict[str, Switch]:
-    """All that are compared with this project's version: each switch alone, and all together."""
-    return {**SWITCHES, LITERAL: reduce(operator.or_, SWITCHES.values(), {})}
+    """All that are compared with this version: each switch alone, and the paper at some time steps."""
+    literal: Switch = reduce(operator.or_, AS_IN_THE_PAPER.values(), {})
+    scanned = {f"{LITERAL}, {step:g} s": {**literal, "frame_pair.step": step} for step in LITERAL_STEPS}
+    return {**AS_IN_THE_PAPER, **WITHOUT, LITERAL: literal, **scanned}
 
 
 def switched(scenario: Scenario, switch: Switch) -> Scenario:

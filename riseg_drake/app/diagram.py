@@ -28,7 +28,7 @@ from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.pushing.decision import Decision
 from riseg_drake.pushing.push import ArmPhase, Push
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture
-from riseg_drake.segmentation.segment import Segmentation
+from riseg_drake.segmentation.segmentation import Segmentation
 from riseg_drake.stations.hardware import HardwareStation, TargetSink
 from riseg_drake.stations.lcm_reception import Reception
 from riseg_drake.stations.simulated import SimulatedStation, SimulatedStationConfig, start_position

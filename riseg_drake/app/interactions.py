@@ -18,6 +18,7 @@ from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pushing.decision import UNDECIDED, Decision, Ending
 from riseg_drake.pushing.push import NO_PUSH, ArmPhase, Push
+from riseg_drake.segmentation.segmentation import Segmentation
 from riseg_drake.systems.stage_clock import StageClock
 
 Listener = Callable[[Frame, Context], None]
@@ -153,7 +154,7 @@ def simulated_truth(wired: WiredDiagram) -> TruthSource:
 
 class _Seen(NamedTuple):
     frame: Frame
-    mask: NDArray[np.uint16]
+    segmentation: Segmentation
     truth: Truth | None
 
 
@@ -215,7 +216,7 @@ class _Book:
         if truth is not None:
             _ = truth.labels
         if truth is not None or self._seen is None or self._seen.truth is None:
-            self._seen = _Seen(frame, self._wired.mask(self._context), truth)
+            self._seen = _Seen(frame, self._wired.segmentation(self._context), truth)
 
     def _count_moved(self, truth: Truth) -> None:
         """Score what has moved in this interaction. Labels are drawn only where there is such a thing."""
@@ -227,13 +228,15 @@ class _Book:
     def close(self, interaction_step: int) -> Step:
         """The step that ends with the last frame at rest; the count starts anew."""
         assert self._seen is not None
-        frame, mask, truth = self._seen
+        frame, segmentation, truth = self._seen
+        mask = segmentation.mask
         step = Step(
             interaction_step=interaction_step,
             time=frame.time,
             color=frame.color,
             depth=frame.depth,
             mask=mask,
+            confidence=segmentation.confidence,
             frames=self._frames,
             stage_seconds={stage: tuple(times) for stage, times in self._clock.seconds.items()},
             ground_truth=truth.labels if truth else None,

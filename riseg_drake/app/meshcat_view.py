@@ -17,7 +17,7 @@ from riseg_drake.geometry.camera import back_project
 from riseg_drake.geometry.rgbd import NO_PAIR, Frame, FramePair
 from riseg_drake.pictures.object_colors import object_colors
 from riseg_drake.pushing.push import NO_PUSH, Push
-from riseg_drake.segmentation.segment import Segmentation, nothing_segmented
+from riseg_drake.segmentation.segmentation import Segmentation, nothing_segmented
 
 POINT_STRIDE = 3
 """Every third pixel in both directions becomes a point: 34 thousand at 640x480."""

@@ -47,6 +47,8 @@ class Step:
     """L*_t [H, W], 0 = background."""
     frames: int
     """Camera frames since the last step."""
+    confidence: Mapping[int, float] = field(default_factory=dict)
+    """Of each id that was decided on the probability that it is one object and all of it."""
     stage_seconds: Mapping[str, Sequence[float]] = field(default_factory=dict)
     """Wall time of every call since the last step, by stage, s."""
     ground_truth: NDArray[np.uint16] | None = None
@@ -89,7 +91,9 @@ class RunFolder:
                 write_png(unfinished / "color.png", step.color)
                 write_png(unfinished / "depth.png", depth_to_millimetres(step.depth))
                 write_png(unfinished / "mask.png", step.mask.astype(np.uint16))
-                write_png(unfinished / "overlay.png", draw_masks(step.color, step.mask))
+                write_png(
+                    unfinished / "overlay.png", draw_masks(step.color, step.mask, confidence=step.confidence)
+                )
                 if step.ground_truth is not None:
                     write_png(unfinished / "ground_truth.png", step.ground_truth.astype(np.uint16))
                 with undisturbed():
@@ -137,12 +141,18 @@ def stage_figures(seconds: Mapping[str, Sequence[float]]) -> dict[str, dict[str,
     }
 
 
+def confidence_figures(confidence: Mapping[int, float]) -> dict[str, float]:
+    """By id, as JSON has it: a string."""
+    return {str(object_id): round(sure, 3) for object_id, sure in sorted(confidence.items())}
+
+
 def _step_to_json(step: Step) -> dict[str, Any]:
     content: dict[str, Any] = {
         "step": step.interaction_step,
         "time_s": round(step.time, 6),
         "frames": step.frames,
         "objects": step.objects,
+        "confidence": confidence_figures(step.confidence),
         "stages": stage_figures(step.stage_seconds),
     }
     if step.scores is not None:

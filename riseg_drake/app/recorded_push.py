@@ -1,13 +1,13 @@
 """One push, held in memory: what the station gave at every picture, to be put through Alg. 2 again."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram
 
-from riseg_drake.app.diagram import make_diagram
+from riseg_drake.app.diagram import WiredDiagram, make_diagram
 from riseg_drake.app.interactions import Progress, interactions
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.scenario_file import ScenarioError
@@ -17,27 +17,41 @@ from riseg_drake.learned.sam import SamParameters
 from riseg_drake.pushing.push import ArmPhase
 from riseg_drake.systems.stage_clock import StageClock
 
+Kept = TypeVar("Kept")
 StationOutputs = dict[str, Any]
 """What a station gave at one tick of the camera, by the names of the segmentation's inputs."""
 
 
 def push_images(scenario: Scenario, seed: int) -> list[StationOutputs]:
     """The station's outputs at every frame of the first push. Raises ScenarioError if there is none."""
+
+    def outputs(wired: WiredDiagram, _: Frame, context: Context) -> StationOutputs:
+        return {name: wired.copy(port, context) for name, port in STATION_PORTS.items()}
+
+    return _of_push(scenario, seed, outputs)
+
+
+def push_frames(scenario: Scenario, seed: int) -> list[Frame]:
+    """Every frame of the first push, for `segment_objs`. Raises ScenarioError if there is none."""
+    return _of_push(scenario, seed, lambda _, frame, __: frame)
+
+
+def _of_push(scenario: Scenario, seed: int, read: Callable[[WiredDiagram, Frame, Context], Kept]) -> list[Kept]:
     wired = make_diagram(replace(scenario, sam=SamParameters()), seed)  # sharper outlines are not wanted here
     progress = Progress()
-    images: list[StationOutputs] = []
+    kept: list[Kept] = []
 
-    def keep(_: Frame, context: Context) -> None:
+    def keep(frame: Frame, context: Context) -> None:
         if wired.phase(context) is ArmPhase.PUSH:
-            images.append({name: wired.copy(port, context) for name, port in STATION_PORTS.items()})
-        elif images:
+            kept.append(read(wired, frame, context))
+        elif kept:
             progress.end = "the push is over"
 
     for _ in interactions(wired, StageClock(), progress, scenario.longest, (keep,)):
         pass
-    if len(images) < 2:
+    if len(kept) < 2:
         raise ScenarioError(f"with seed {seed} the arm finds nothing to push; choose another seed")
-    return images
+    return kept
 
 
 def put_through(segmentation: Diagram, images: Sequence[StationOutputs], period: float) -> Iterator[Context]:

@@ -12,7 +12,7 @@ from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.segmentation_block import make_segmentation
 from riseg_drake.recording.layout import RecordedFrame
-from riseg_drake.segmentation.segment import Segmentation
+from riseg_drake.segmentation.segmentation import Segmentation
 from riseg_drake.systems.frame_view import FrameView
 
 PERIOD = 1 / 15

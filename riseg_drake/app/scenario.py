@@ -9,6 +9,7 @@ from riseg_drake.app.scenario_file import ScenarioError, parse_scenario, read_sc
 from riseg_drake.learned.sam import SamParameters
 from riseg_drake.pushing.push_planning import PushPlanningParameters
 from riseg_drake.segmentation.above_table import AboveTableParameters
+from riseg_drake.segmentation.algorithm import SegmentObjsParameters
 from riseg_drake.segmentation.bfif import BFIFParameters
 from riseg_drake.segmentation.camera_motion import CameraMotionParameters
 from riseg_drake.segmentation.frame_pairs import FramePairParameters
@@ -50,6 +51,13 @@ class Scenario:
     """The drivers that `riseg emulate` stands in for, around the station above."""
     longest: float = field(default=300.0, metadata={"least": 1.0, "most": 86400.0})
     """A run ends after this time even if the arm is not done, simulated seconds."""
+
+    @property
+    def segment_objs(self) -> SegmentObjsParameters:
+        """What Alg. 2 takes of it, for who calls it without a diagram."""
+        return SegmentObjsParameters(
+            self.above_table, self.frame_pair, self.camera_motion, self.bfif, self.segment
+        )
 
     @property
     def simulated(self) -> SimulatedStationConfig:

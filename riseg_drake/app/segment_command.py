@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, astuple, dataclass, field
 from pathlib import Path
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from riseg_drake.app.output import RECORDING, stage_figures
+from riseg_drake.app.output import RECORDING, confidence_figures, stage_figures
 from riseg_drake.app.output_folder import OutputError
 from riseg_drake.app.recorded_view import RecordedView, recorded_view
 from riseg_drake.app.replay import Replay
@@ -64,7 +64,9 @@ class SegmentResult:
     frames: int = 0
     """Masks written."""
     object_ids: tuple[int, ...] = ()
-    """Of all objects ever found."""
+    """Of all objects that are known after the last frame."""
+    confidence: Mapping[int, float] = field(default_factory=dict)
+    """Of these, as far as they were decided on."""
     scored: int = 0
     """Frames with true labels."""
     last: Scores | None = None
@@ -148,9 +150,10 @@ def _take(
         scores = result.last = score(mask, frame.labels)
         result.sums += astuple(scores)
         result.scored += 1
-    folder.write(frame.name, frame.color, mask, scores)
+    segmentation = replay.segmentation
+    folder.write(frame.name, frame.color, mask, segmentation.confidence, scores)
     result.frames += 1
-    result.object_ids = replay.segmentation.object_ids
+    result.object_ids, result.confidence = segmentation.object_ids, segmentation.confidence
 
 
 class _Told:
@@ -224,6 +227,7 @@ def _state_of(folder: SegmentFolder, result: SegmentResult, clock: StageClock) -
             frames=result.frames,
             objects=len(result.object_ids),
             object_ids=list(result.object_ids),
+            confidence=confidence_figures(result.confidence),
             **scores,
             left_out=[asdict(line) for line in result.left_out],
             warnings=result.warnings,

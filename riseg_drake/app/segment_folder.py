@@ -53,9 +53,16 @@ class SegmentFolder:
             (folder / MASKS).mkdir(exist_ok=True)
 
     def write(
-        self, name: str, color: NDArray[np.uint8], mask: NDArray[np.uint16], scores: Scores | None
+        self,
+        name: str,
+        color: NDArray[np.uint8],
+        mask: NDArray[np.uint16],
+        confidence: Mapping[int, float],
+        scores: Scores | None,
     ) -> None:
         """Write what belongs to one frame, colour [H, W, 3] and mask [H, W]; `name` is its colour image's.
+
+        The video shows the confidence of each id, too.
 
         Raises OutputError where the disk is full or the folder has gone.
         """
@@ -64,7 +71,7 @@ class SegmentFolder:
             write_png(self.path / MASKS / file, mask.astype(np.uint16))
             if scores is not None:
                 self._write_scores(file, scores)
-        self._show(draw_masks(color, mask))
+        self._show(draw_masks(color, mask, confidence=confidence))
 
     def note(self, **entries: Any) -> None:
         """Enter something in the summary."""

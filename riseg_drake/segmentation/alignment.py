@@ -6,10 +6,8 @@ body it lies: the motion that makes the second image agree with the first, in gr
 is found by Gauss-Newton from where the group's motion starts. Nothing of it is in the paper.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,10 +24,6 @@ _CORRELATED = 6.0
 """Noise of depth is correlated over about so many pixels; they count as one."""
 _COST_MAX = np.float32(9)
 """Squared normalised residuals count no more than that."""
-_FAR_BLUR = 4.0
-"""Pixels by which both images are blurred to find a motion from afar."""
-_LOOSE_TURN, _LOOSE_SHIFT, _LOOSE_ROUNDS = 0.1, 0.01, 6
-"""rad, m and Gauss-Newton steps for a whole of which no body frame says how it moves."""
 
 
 @dataclass
@@ -38,8 +32,6 @@ class AlignmentParameters:
 
     rounds: int = 2
     """Gauss-Newton steps; 0 leaves the motions as the body frames have them."""
-    pixels: int = 2000
-    """At most so many pixels of the reference frame take part."""
     turn: float = 0.03
     """rad; how well the body frames know a motion's rotation."""
     shift: float = 0.0015
@@ -50,11 +42,6 @@ class AlignmentParameters:
     """Pixels that a motion needs to be sharpened."""
     same_flow: float = 0.35
     """Pixels (root mean square); motions that predict flow within that are one."""
-    explained: float = 4.0
-    """Mean squared residuals (gray and depth, 2 where a motion is right) up to which the edges of a whole are
-    explained and need no motion of their own."""
-    gain_min: float = 1.0
-    """By how much a motion of its own must explain them better."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +57,6 @@ class EdgePixels(Immutable):
     """[N]."""
     variance: NDArray[np.float32]
     """[N], of the difference between that and where it should reappear."""
-    wholes: Sequence[NDArray[np.bool_]]
-    """[pieces] each: pieces that are likely to move as one, large blank surfaces and known objects."""
 
     def subset(self, which: NDArray[np.intp]) -> "EdgePixels":
         """Some of the pixels, by their numbers [N]."""
@@ -81,7 +66,6 @@ class EdgePixels(Immutable):
             self.piece[which],
             self.gray[which],
             self.variance[which],
-            self.wholes,
         )
 
 
@@ -92,7 +76,7 @@ def align_motions(
     depth_noise: float,
     parameters: AlignmentParameters,
 ) -> NDArray[np.float64]:
-    """Motions [G', 4, 4] in C0: the given ones sharpened, and those of wholes that none explains.
+    """Motions [G', 4, 4] in C0, sharpened; those that end in the same one are one.
 
     Args:
         pair: the frames of t-1 and t.
@@ -104,9 +88,10 @@ def align_motions(
     if not len(edges.piece) or parameters.rounds == 0:
         return motions
     image_1 = rigid_fit(pair, depth_noise)
-    cost = edge_costs(pair, edges, motions, depth_noise)
+    # Each piece goes to what explains it best, standing still among them.
     pieces = int(edges.piece.max()) + 1
-    owner = np.argmin([np.bincount(edges.piece, c, pieces) for c in cost], axis=0)[edges.piece]
+    cost = [np.bincount(edges.piece, image_1.cost(edges, X), pieces) for X in (np.eye(4), *motions)]
+    owner = np.argmin(cost, axis=0)[edges.piece]
     focal_length = pair.current.intrinsics.fx
     aligned: list[NDArray] = []
     for g, motion in enumerate(motions):
@@ -116,56 +101,7 @@ def align_motions(
         p_C0Q = edges.p_C0Q[mine] if len(mine) else edges.p_C0Q
         if all(flow_difference(p_C0Q, motion, X, focal_length) > parameters.same_flow for X in aligned):
             aligned.append(motion)
-    wholes = [np.flatnonzero(whole[edges.piece]) for whole in edges.wholes]
-    unexplained = [
-        mine
-        for mine in wholes
-        if len(mine) >= parameters.members_min and cost[:, mine].mean(1).min() >= parameters.explained
-    ]
-    if unexplained:
-        # An edge is sharp: it leads nowhere from more than two pixels away. Blurred, it is seen from afar.
-        v, u = edges.surface.pixel
-        far_image = replace(image_1, gray=_blurred(image_1.gray))
-        far_edges = replace(edges, gray=_blurred(pair.reference.gray)[v, u])
-    for mine in unexplained:
-        proposed = _propose(image_1, edges.subset(mine), far_image, far_edges.subset(mine), aligned, parameters)
-        if proposed is not None:
-            aligned.append(proposed)
     return np.array(aligned).reshape(-1, 4, 4)
-
-
-def edge_costs(
-    pair: FramePair, edges: EdgePixels, motions: NDArray[np.float64], depth_noise: float
-) -> NDArray[np.float32]:
-    """How badly standing still and each motion [G, 4, 4] explain each edge pixel, [1 + G, N]: 2 where it is
-    right, 18 at most."""
-    image_1 = rigid_fit(pair, depth_noise)
-    return np.array([image_1.cost(edges, motion) for motion in (np.eye(4), *motions)])
-
-
-def _propose(
-    image_1: "RigidFit",
-    edges: EdgePixels,
-    far_image: "RigidFit",
-    far_edges: EdgePixels,
-    motions: list[NDArray],
-    parameters: AlignmentParameters,
-) -> NDArray | None:
-    """A motion of one whole that explains it clearly better than the known ones do, if there is one."""
-    known = sorted(
-        ((float(image_1.cost(edges, X).mean()), k, X) for k, X in enumerate((np.eye(4), *motions))),
-    )
-    loose = replace(parameters, turn=_LOOSE_TURN, shift=_LOOSE_SHIFT)
-    proposals = []
-    for _, _, X in known[:3]:
-        nearer, _ = far_image.align(far_edges, X, _LOOSE_ROUNDS, loose)
-        proposals += [image_1.align(edges, start, _LOOSE_ROUNDS, loose) for start in (X, nearer)]
-    motion, cost = min(proposals, key=lambda proposal: proposal[1])
-    return motion if cost < known[0][0] - parameters.gain_min else None
-
-
-def _blurred(gray: NDArray[np.float32]) -> NDArray[np.float32]:
-    return cv2.GaussianBlur(gray, (0, 0), _FAR_BLUR)
 
 
 def edge_pixels(
@@ -173,7 +109,6 @@ def edge_pixels(
     piece: NDArray[np.intp],
     contrast: NDArray[np.bool_],
     variance: NDArray[np.float32],
-    wholes: Sequence[NDArray[np.bool_]],
     pixels_max: int,
 ) -> EdgePixels:
     """Evenly taken pixels with contrast of the pieces [H, W] (-1 = none).
@@ -183,14 +118,13 @@ def edge_pixels(
         piece: [H, W], number of each pixel's piece.
         contrast: [H, W], see `has_contrast`.
         variance: [H, W], see `gray_variance`.
-        wholes: see `EdgePixels`.
         pixels_max: at most so many are taken.
     """
     surface = surface_pixels((piece >= 0) & contrast, frame.depth, frame.intrinsics)
     surface = surface.subset(np.arange(0, len(surface), max(1, -(-len(surface) // pixels_max))))
     v, u = surface.pixel
     p_C0Q = rays(frame.intrinsics)[v, u].astype(float) * surface.depth[:, None]
-    return EdgePixels(surface, p_C0Q, piece[v, u], frame.gray[v, u], variance[v, u], wholes)
+    return EdgePixels(surface, p_C0Q, piece[v, u], frame.gray[v, u], variance[v, u])
 
 
 def has_contrast(variance: NDArray[np.float32], noise: MeasurementNoise) -> NDArray[np.bool_]:

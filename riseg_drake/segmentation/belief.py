@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
 from riseg_drake.segmentation.above_table import AboveTable
-from riseg_drake.segmentation.association import UNKNOWN
 from riseg_drake.segmentation.border_prior import BorderPriorParameters, border_prior
 from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe
 from riseg_drake.segmentation.noise import MeasurementNoise
@@ -19,7 +18,7 @@ from riseg_drake.segmentation.partition import (
     partition,
     with_ids,
 )
-from riseg_drake.segmentation.propagation import carry_labels
+from riseg_drake.segmentation.propagation import UNKNOWN, carry_labels
 
 
 @dataclass

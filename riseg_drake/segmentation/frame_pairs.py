@@ -12,6 +12,9 @@ import numpy as np
 from riseg_drake.geometry.rgbd import NO_PAIR, Frame, FramePair
 from riseg_drake.geometry.se3 import log_se3
 
+_SAME_TIME = 1e-3
+"""s; stamps are rounded."""
+
 
 @dataclass
 class FramePairParameters:
@@ -19,6 +22,9 @@ class FramePairParameters:
 
     kind: str = field(default="motion", metadata={"choices": ("motion", "consecutive")})
     """"motion" or, as in the paper, "consecutive"."""
+    step: float = field(default=0.0, metadata={"least": 0.0, "most": 60.0})
+    """s between t-1 and t of consecutive pairs, which the paper does not give; 0: each frame with the one
+    before it. Frames in between are paired with the t-1 before them."""
     flow_span_share: float = 0.03125
     """Effective flow, as a share of the image's width, after which the reference is renewed: 20 pixels of
     640."""
@@ -47,7 +53,8 @@ def next_pair(pair: FramePair, frame: Frame, flow_span: float, parameters: Frame
     if pair is NO_PAIR:
         return FramePair(frame, frame)
     if parameters.kind == "consecutive":
-        return FramePair(pair.current, frame)
+        complete = pair.current.time - pair.reference.time >= parameters.step - _SAME_TIME
+        return FramePair(pair.current if complete else pair.reference, frame)
     if flow_span >= parameters.moving:
         renew = flow_span > parameters.flow_span_share * frame.intrinsics.width
         share = parameters.camera_span_moving

@@ -95,7 +95,7 @@ def make_keyframe(
     size = max(3, round(parameters.superpixel * above.pixels_per_metre(frame.intrinsics)))
     cut = superpixels(frame.color[region], above.height[region], above.mask[region], size)
     if bodies is not None:
-        cut = split_superpixels(cut, bodies[region], frame.color[region], above.height[region])
+        cut = split_superpixels(cut, bodies[region])
     owner = np.full(above.mask.shape, -1, np.intp)
     owner[region] = cut.label
     variance = gray_variance(frame.gray, noise)
@@ -113,5 +113,5 @@ def make_keyframe(
         gray=frame.gray[v, u],
         variance=variance[v, u],
         gradient_squared=(variance[v, u] - np.float32(2 * noise.color**2)) / np.float32(noise.registration**2),
-        edges=edge_pixels(frame, owner, has_contrast(variance, noise), variance, [], parameters.edge_pixels),
+        edges=edge_pixels(frame, owner, has_contrast(variance, noise), variance, parameters.edge_pixels),
     )

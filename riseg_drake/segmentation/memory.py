@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.camera import rays
 from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.geometry.se3 import inverse, move_points
-from riseg_drake.segmentation.association import UNKNOWN
-from riseg_drake.segmentation.propagation import pixels_of
+from riseg_drake.segmentation.propagation import UNKNOWN, pixels_of
 
 _EVERY = 2
 """Every second pixel in each direction is remembered; the gaps close when they are drawn again."""

@@ -1,6 +1,5 @@
 """From groups of body frames to the rigid motions that they share (end of Alg. 2, line 6)."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,8 +10,6 @@ from riseg_drake.geometry.se3 import exp_se3, move_points, translation
 from riseg_drake.segmentation.body_frames import BodyFrames
 from riseg_drake.segmentation.twists import fit_motion
 
-_AHEAD = np.array([[0.0, 0.0, 0.4], [0.05, 0.0, 0.4], [0.0, 0.05, 0.4]])
-"""Points to compare motions by, m, where there are no others."""
 _POINTS_MAX = 200
 """A motion of six numbers needs no more points than that."""
 
@@ -130,30 +127,3 @@ def merge_equal_motions(
             new_of[g] = len(leaders)
             leaders.append(g)
     return np.array([new_of[int(g)] for g in group], dtype=np.intp)
-
-
-def motion_gaps(p_C0Q: NDArray, motions: NDArray, focal_length: float) -> NDArray[np.float64]:
-    """Pixels by which standing still (index 0) and the motions [G, 4, 4] differ, [1 + G, 1 + G].
-
-    At the points p_C0Q [N, 3], m, seen with the focal length, pixels.
-    """
-    moved = np.stack([p_C0Q[:, :2], *(move_points(X, p_C0Q)[:, :2] for X in motions)])
-    moved *= focal_length / p_C0Q[:, 2:]
-    apart = moved[:, None] - moved[None]
-    return np.sqrt((apart**2).sum(-1).mean(-1))
-
-
-def with_earlier_motions(
-    groups: BFIFGroups, earlier: Iterable[NDArray], focal_length: float, parameters: MotionParameters
-) -> NDArray[np.float64]:
-    """The groups' motions, then those found earlier that no group has now, [G', 4, 4].
-
-    What has moved since the reference frame stays displaced, even in a frame in which no group says so. The
-    focal length, pixels, tells how far motions are apart in the image.
-    """
-    motions = list(groups.motion_C0)
-    for X in earlier:
-        p = groups.p_C0Q if len(groups.p_C0Q) else _AHEAD
-        if all(flow_difference(p, X, Y, focal_length) > parameters.merge_flow for Y in motions):
-            motions.append(X)
-    return np.array(motions).reshape(-1, 4, 4)

@@ -32,6 +32,9 @@ such a reference stays, and once more."""
 _FAR = 0.0125
 """Share of the image's width that a pair spans from which on it spans far."""
 
+_LEAST = 16
+"""Pixels; of a narrower part of the image no method can tell flow, and some refuse it."""
+
 
 class FlowMethod(Protocol):
     """What a flow method must do."""
@@ -65,7 +68,7 @@ def flow_around(above_0: AboveTable, pair: FramePair, method: FlowMethod) -> NDA
     du, dv = round(float(a / c - u)), round(float(b / c - v))
     rows, shifted_rows = _seen_in_both(rows, dv, height)
     columns, shifted_columns = _seen_in_both(columns, du, width)
-    if rows.start < rows.stop and columns.start < columns.stop:
+    if min(rows.stop - rows.start, columns.stop - columns.start) >= _LEAST:
         images = pair.reference.color[rows, columns], pair.current.color[shifted_rows, shifted_columns]
         np.add(method(*images), np.array([du, dv], np.float32), out=flow[rows, columns])
     return flow

@@ -16,8 +16,10 @@ from riseg_drake.geometry.camera import Intrinsics, bounding_region, project
 from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.geometry.se3 import inverse
 from riseg_drake.segmentation.above_table import AboveTable
-from riseg_drake.segmentation.association import UNKNOWN
 from riseg_drake.segmentation.surface import SurfacePixels, seek, surface_pixels
+
+UNKNOWN = np.uint16(65535)
+"""Label of pixels above the table that no object has claimed yet; never leaves the propagator."""
 
 _DEPTH_AGREES = 0.008
 """m; a point and the surface it is looked up on are the same within that (noise, slopes, edges)."""

@@ -1,4 +1,4 @@
-"""Line 7 of Alg. 2 by one model of evidence, in place of rules: in trial, see docs/paper.md.
+"""Alg. 2, line 7, by one model of evidence.
 
 Frames are compared with a keyframe, the picture of the last rest. While something moves, the motions of lines
 3 to 6 are chained to what each body has done since then, and carry the mask along. At the next rest both
@@ -6,7 +6,6 @@ pictures are sharp, have depth, and span all that happened: that pair decides, i
 second frame becomes the keyframe.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import cv2
@@ -14,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import rays
-from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
+from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.geometry.se3 import inverse, move_points
 from riseg_drake.segmentation.above_table import AboveTable
-from riseg_drake.segmentation.association import UNKNOWN
 from riseg_drake.segmentation.belief import (
     Belief,
     BeliefParameters,
@@ -36,8 +34,9 @@ from riseg_drake.segmentation.motion_search import MotionSearchParameters, searc
 from riseg_drake.segmentation.motions import BFIFGroups
 from riseg_drake.segmentation.observation import Observation, ObservationParameters, observe
 from riseg_drake.segmentation.partition import margins
-from riseg_drake.segmentation.propagation import pixels_of
+from riseg_drake.segmentation.propagation import UNKNOWN, pixels_of
 from riseg_drake.segmentation.rest import RestParameters, is_still
+from riseg_drake.segmentation.segmentation import Segmentation
 
 
 @dataclass
@@ -62,72 +61,15 @@ class EvidenceParameters:
     """Remember objects that leave the view (not in the paper)."""
 
 
-@dataclass(frozen=True)
-class EvidentSegmentation(Immutable):
-    """L_t, and what must be remembered for L_t+1: the propagator's one state."""
-
-    sequence: int
-    """Number of the frame that `label` belongs to; -1 before the first."""
-    label: NDArray[np.uint16]
-    """[H, W], ids, UNKNOWN where something stands that has not moved yet, 0 for table and robot."""
-    margin: Mapping[int, float] = field(default_factory=dict)
-    """For each id, by how many nats a border the partition is better than the next best one."""
-    settled: float = 0.0
-    """The margin that leaves no doubt."""
-    belief: Belief | None = None
-    """As of the keyframe; None before anything stood on the table."""
-    bodies: Mapping[int, Bodies] = field(default_factory=dict)
-    """By frame number, since the pair's reference: the bodies, and how they moved since the keyframe."""
-    frame: Frame | None = None
-    """The last one."""
-    still_since: float | None = None
-    """s; None while something moves."""
-    decided: bool = True
-    """Whether the present rest has been looked at."""
-    memory: Memory = field(default_factory=dict)
-    """Points of objects that the keyframe does not see, as of its time."""
-
-    @property
-    def mask(self) -> NDArray[np.uint16]:
-        """L_t [H, W]: object ids, 0 = background."""
-        return np.where(self.label == UNKNOWN, np.uint16(0), self.label)
-
-    @property
-    def settled_mask(self) -> NDArray[np.uint16]:
-        """L_t [H, W] without the objects in doubt: what needs no further push."""
-        doubtful = [a for a, margin in self.margin.items() if margin < self.settled]
-        mask = self.mask
-        return np.where(np.isin(mask, doubtful), np.uint16(0), mask) if doubtful else mask
-
-    @property
-    def confidence(self) -> dict[int, float]:
-        """For each id the probability, by the margin, that it is one object and all of it."""
-        return {a: float(1 / (1 + np.exp(self.settled - 2 * margin))) for a, margin in self.margin.items()}
-
-    @property
-    def object_ids(self) -> tuple[int, ...]:
-        """All ids that are held now, in the view or not."""
-        ids = set(self.memory)
-        if self.belief is not None:
-            newest = self.bodies[max(self.bodies)].body if self.bodies else self.belief.body
-            ids |= set(np.unique(newest[newest > 0]).tolist())
-        return tuple(sorted(int(a) for a in ids))
-
-
-def nothing_evident(shape: tuple[int, int]) -> EvidentSegmentation:
-    """L_0: an empty mask [H, W] (Alg. 1, line 3)."""
-    return EvidentSegmentation(sequence=-1, label=np.zeros(shape, np.uint16))
-
-
 def segment_by_evidence(
-    before: EvidentSegmentation,
+    before: Segmentation,
     pair: FramePair,
     groups: BFIFGroups,
     above_0: AboveTable,
     above_1: AboveTable,
     parameters: EvidenceParameters,
     bfif: BFIFParameters,
-) -> EvidentSegmentation:
+) -> Segmentation:
     """L_t from G_t and L_t-1.
 
     Args:
@@ -183,12 +125,12 @@ def segment_by_evidence(
 
 
 def _begin(
-    before: EvidentSegmentation,
+    before: Segmentation,
     frame: Frame,
     above: AboveTable,
     parameters: EvidenceParameters,
     bfif: BFIFParameters,
-) -> EvidentSegmentation:
+) -> Segmentation:
     """The first keyframe, once something stands on the table."""
     label = np.where(above.mask, UNKNOWN, np.uint16(0))
     belief = first_belief(frame, above, bfif.noise, parameters.belief) if above.mask.any() else None
@@ -198,12 +140,12 @@ def _begin(
 
 
 def _with_rest(
-    before: EvidentSegmentation,
+    before: Segmentation,
     frame: Frame,
     above: AboveTable,
     parameters: EvidenceParameters,
     bfif: BFIFParameters,
-) -> EvidentSegmentation:
+) -> Segmentation:
     """Whether anything moves, from the last frame to this one."""
     assert before.frame is not None
     if not is_still(before.frame, frame, above, bfif.noise, parameters.rest):
@@ -211,7 +153,7 @@ def _with_rest(
     return replace(before, still_since=frame.time) if before.still_since is None else before
 
 
-def _bodies_before(now: EvidentSegmentation) -> Bodies:
+def _bodies_before(now: Segmentation) -> Bodies:
     assert now.belief is not None
     return now.bodies[max(now.bodies)] if now.bodies else standing(now.belief)
 
@@ -239,7 +181,7 @@ def _searched(
 
 
 def _carried(
-    now: EvidentSegmentation,
+    now: Segmentation,
     pair: FramePair,
     above: AboveTable,
     seen: Observation | None,
@@ -247,7 +189,7 @@ def _carried(
     deciding: bool,
     parameters: EvidenceParameters,
     bfif: BFIFParameters,
-) -> EvidentSegmentation:
+) -> Segmentation:
     """The mask in the view of t, and a new keyframe where it is time for one."""
     belief, frame = now.belief, pair.current
     assert belief is not None

@@ -5,13 +5,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import connected_components
 
 _HEIGHT_STEPS = 2000.0
 """Gray levels a metre of height is worth beside colour: half a millimetre is one level."""
-_BLANK = 6.0
-"""Gray levels; two pieces that differ no more across their border are one surface, noise and all."""
+_CRUMB = 5
+"""Pixels; a smaller part of a superpixel beyond a known border goes with the rest."""
 
 
 @dataclass(frozen=True)
@@ -26,8 +24,6 @@ class Superpixels:
     """[M, 2], the two pieces of each border, the smaller number first."""
     length: NDArray[np.float64]
     """[M], pixels along each border."""
-    contrast: NDArray[np.float64]
-    """[M], mean difference across each border, gray levels (of colour or of height, whichever is more)."""
 
 
 def superpixels(
@@ -65,25 +61,7 @@ def superpixels(
     nearest = np.zeros(index.max() + 1, np.intp)
     nearest[index[own]] = flooded[own]
     label = np.where(mask, nearest[index], 0) - 1
-    return _with_borders(label, len(v), image)
-
-
-def blank_surfaces(pieces: Superpixels, area_min: float) -> NDArray[np.intp]:
-    """The surface 0.. that each piece [N] is part of, where pieces without any edge between them make one.
-
-    -1 for the pieces of surfaces smaller than `area_min` pixels.
-    """
-    same = pieces.borders[pieces.contrast < _BLANK]
-    count, surface = connected_pieces(pieces.count, same)
-    area = np.bincount(surface[pieces.label[pieces.label >= 0]], minlength=count)
-    number = np.where(area >= area_min, np.cumsum(area >= area_min) - 1, -1)
-    return number[surface]
-
-
-def connected_pieces(pieces: int, joined: NDArray[np.intp]) -> tuple[int, NDArray[np.intp]]:
-    """How many parts pieces make where pairs of them [M, 2] are joined, and the part of each [pieces]."""
-    graph = csr_matrix((np.ones(len(joined)), (joined[:, 0], joined[:, 1])), shape=(pieces, pieces))
-    return connected_components(graph, directed=False)
+    return _with_borders(label, len(v))
 
 
 def _edges_image(color: NDArray[np.uint8], height: NDArray[np.float32]) -> NDArray[np.uint8]:
@@ -95,37 +73,19 @@ def _edges_image(color: NDArray[np.uint8], height: NDArray[np.float32]) -> NDArr
     return np.stack([gray, warm.astype(np.uint8), cv2.medianBlur(levels, 5)], axis=-1)
 
 
-def _with_borders(label: NDArray[np.intp], count: int, image: NDArray[np.uint8]) -> Superpixels:
-    """Find which pieces touch, along how many pixels, and how much they differ there."""
+def _with_borders(label: NDArray[np.intp], count: int) -> Superpixels:
+    """Find which pieces touch, and along how many pixels."""
     size = max(count, 1) ** 2
-    length, difference = np.zeros(size), np.zeros(size)
-    for axis in (0, 1):
-        a, b = (label[:-1], label[1:]) if axis == 0 else (label[:, :-1], label[:, 1:])
-        v, u = np.nonzero((a != b) & (a >= 0) & (b >= 0))
-        low, high = np.minimum(a[v, u], b[v, u]), np.maximum(a[v, u], b[v, u])
-        # One pixel further to either side: an edge is blurred over its width.
-        dv, du = (1, 0) if axis == 0 else (0, 1)
-        before = image[np.maximum(v - dv, 0), np.maximum(u - du, 0)].astype(np.int16)
-        after = image[np.minimum(v + 2 * dv, image.shape[0] - 1), np.minimum(u + 2 * du, image.shape[1] - 1)]
-        step = np.abs(before - after).max(axis=1)
-        code = low * count + high
-        length += np.bincount(code, minlength=size)
-        difference += np.bincount(code, step, size)
+    length = np.zeros(size)
+    for a, b in ((label[:-1], label[1:]), (label[:, :-1], label[:, 1:])):
+        touch = (a != b) & (a >= 0) & (b >= 0)
+        low, high = np.minimum(a[touch], b[touch]), np.maximum(a[touch], b[touch])
+        length += np.bincount(low * count + high, minlength=size)
     code = np.flatnonzero(length)
-    borders = np.stack(np.divmod(code, max(count, 1)), axis=1)
-    return Superpixels(label, count, borders, length[code], difference[code] / length[code])
+    return Superpixels(label, count, np.stack(np.divmod(code, max(count, 1)), axis=1), length[code])
 
 
-_CRUMB = 5
-"""Pixels; a smaller part of a superpixel beyond a known border goes with the rest."""
-
-
-def split_superpixels(
-    cut: Superpixels,
-    bodies: NDArray[np.integer],
-    color: NDArray[np.uint8],
-    height: NDArray[np.float32],
-) -> Superpixels:
+def split_superpixels(cut: Superpixels, bodies: NDArray[np.integer]) -> Superpixels:
     """The superpixels, split where a label image [H, W] has a border."""
     inside = cut.label >= 0
     if not inside.any():
@@ -141,4 +101,4 @@ def split_superpixels(
     target = np.where(pixels >= _CRUMB, np.arange(len(code)), largest[of])
     label = np.full(cut.label.shape, -1, np.intp)
     kept, label[inside] = np.unique(target[part], return_inverse=True)
-    return _with_borders(label, len(kept), _edges_image(color, height))
+    return _with_borders(label, len(kept))

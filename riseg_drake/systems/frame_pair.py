@@ -1,27 +1,15 @@
 """The one memory of frames: (I_t-1, I_t, theta_t-1, theta_t) and what stands on the table in both."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
 
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
 
-from riseg_drake.geometry.rgbd import NO_FRAME, NO_PAIR, Frame, FramePair, Immutable
-from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE, AboveTable
-from riseg_drake.segmentation.camera_motion import CameraMotionParameters, PoseError, renewed_pose_error
-from riseg_drake.segmentation.exposure import with_equal_exposure
-from riseg_drake.segmentation.frame_pairs import FramePairParameters, next_pair
-
-
-@dataclass(frozen=True)
-class RememberedPair(Immutable):
-    """The pair, and objMask of its two frames."""
-
-    pair: FramePair = NO_PAIR
-    above_0: AboveTable = NOTHING_ABOVE_TABLE
-    above_1: AboveTable = NOTHING_ABOVE_TABLE
-    pose_error: PoseError = field(default_factory=PoseError)
-    """Of the camera's motion, as the table shows it."""
+from riseg_drake.geometry.rgbd import NO_FRAME, NO_PAIR
+from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
+from riseg_drake.segmentation.camera_motion import CameraMotionParameters
+from riseg_drake.segmentation.frame_pairs import FramePairParameters
+from riseg_drake.segmentation.remembered_pair import RememberedPair, with_frame
 
 
 class FramePairMemory(LeafSystem):
@@ -73,25 +61,16 @@ class FramePairMemory(LeafSystem):
         )
 
     def _take_frame(self, context: Context, state: State) -> EventStatus:
-        frame: Frame = self._frame.Eval(context)
-        memory = self._recall(context)
-        if frame.time <= memory.pair.current.time:  # as that of NO_FRAME always is
+        memory, frame = self._recall(context), self._frame.Eval(context)
+        if frame.time <= memory.pair.current.time:
             # Said so, lest all that follows from the state be computed anew: flow, for one.
             return EventStatus.DidNothing()
-        above = self._above.Eval(context)
-        if memory.pair is NO_PAIR:
-            pair = next_pair(NO_PAIR, frame, 0.0, self._parameters)
-            above_0, error = above, memory.pose_error
-        else:
-            flow_span = float(self._flow_span.Eval(context)[0])
-            frame = replace(frame, sequence=memory.pair.current.sequence + 1)
-            pair = with_equal_exposure(next_pair(memory.pair, frame, flow_span, self._parameters))
-            frame = pair.current
-            above_0 = memory.above_0 if pair.reference is memory.pair.reference else memory.above_1
-            error = renewed_pose_error(
-                memory.pose_error, memory.pair.current, memory.above_1, frame, above, self._camera_motion
-            )
-        state.get_mutable_abstract_state(self._memory).set_value(RememberedPair(pair, above_0, above, error))
+        # Nothing has flowed before there is a pair: the way to the span leads through both frames.
+        flow_span = 0.0 if memory.pair is NO_PAIR else float(self._flow_span.Eval(context)[0])
+        following = with_frame(
+            memory, frame, self._above.Eval(context), flow_span, self._parameters, self._camera_motion
+        )
+        state.get_mutable_abstract_state(self._memory).set_value(following)
         return EventStatus.Succeeded()
 
     def _recall(self, context: Context) -> RememberedPair:

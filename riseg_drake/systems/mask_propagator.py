@@ -8,12 +8,8 @@ from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR, FramePair
 from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
 from riseg_drake.segmentation.bfif import BFIFParameters, no_groups
 from riseg_drake.segmentation.optical_flow import NO_FLOW
-from riseg_drake.segmentation.segment import Segmentation, SegmentParameters, nothing_segmented, segment
-from riseg_drake.segmentation.segment_by_evidence import (
-    EvidentSegmentation,
-    nothing_evident,
-    segment_by_evidence,
-)
+from riseg_drake.segmentation.segment import SegmentParameters, segment
+from riseg_drake.segmentation.segmentation import Segmentation, nothing_segmented
 from riseg_drake.systems.stage_clock import timed
 
 
@@ -33,7 +29,8 @@ class MaskPropagator(LeafSystem):
     Outputs:
         mask: L_t [H, W] uint16, 0 = background.
         settled_mask: the same without the objects that may be two, for whoever plans pushes.
-        segmentation: Segmentation, the ids, also of objects out of sight, and where they are remembered.
+        segmentation: Segmentation, the ids, also of objects out of sight, where they are remembered, and the
+            confidence of each.
     """
 
     def __init__(
@@ -62,8 +59,7 @@ class MaskPropagator(LeafSystem):
                 ("above_table", NOTHING_ABOVE_TABLE),
             )
         )
-        begin = nothing_evident if self._parameters.method == "evidence" else nothing_segmented
-        nothing = AbstractValue.Make(begin(intrinsics.shape))
+        nothing = AbstractValue.Make(nothing_segmented(intrinsics.shape))
         self._state = self.DeclareAbstractState(nothing)
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, offset, self._update)
         self.DeclareAbstractOutputPort(
@@ -85,7 +81,7 @@ class MaskPropagator(LeafSystem):
             prerequisites_of_calc={self.all_state_ticket()},
         )
 
-    def _segmentation(self, context: Context) -> Segmentation | EvidentSegmentation:
+    def _segmentation(self, context: Context) -> Segmentation:
         return context.get_abstract_state(self._state).get_value()
 
     def _update(self, context: Context, state: State) -> EventStatus:
@@ -98,13 +94,15 @@ class MaskPropagator(LeafSystem):
     @timed
     def _segment(self, context: Context, state: State, pair: FramePair) -> None:
         expected_flow, optical_flow, groups, above_0, above_1 = (s.Eval(context) for s in self._stages)
-        before = self._segmentation(context)
-        parameters, bfif = self._parameters, self._bfif
-        following: Segmentation | EvidentSegmentation
-        if isinstance(before, EvidentSegmentation):
-            following = segment_by_evidence(before, pair, groups, above_0, above_1, parameters.evidence, bfif)
-        else:
-            following = segment(
-                before, pair, expected_flow, optical_flow, groups, above_0, above_1, parameters, bfif
-            )
+        following = segment(
+            self._segmentation(context),
+            pair,
+            expected_flow,
+            optical_flow,
+            groups,
+            above_0,
+            above_1,
+            self._parameters,
+            self._bfif,
+        )
         state.get_mutable_abstract_state(self._state).set_value(following)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from riseg_drake.app import ablation
-from riseg_drake.app.ablation import LITERAL, SWITCHES, ablate, switched, versions
+from riseg_drake.app.ablation import AS_IN_THE_PAPER, LITERAL, LITERAL_STEPS, ablate, switched, versions
 from riseg_drake.app.cli import main
 from riseg_drake.app.replay import Replay
 from riseg_drake.app.scenario import Scenario, load_scenario
@@ -20,24 +20,27 @@ def value(scenario, path):
     return reduce(getattr, path.split("."), scenario)
 
 
-@pytest.mark.parametrize("name", SWITCHES)
+@pytest.mark.parametrize("name", versions())
 def test_a_switch_changes_what_this_version_does(name):
-    scenario = Scenario()
-    for path, literal in SWITCHES[name].items():
-        assert value(scenario, path) != literal
-        assert type(value(scenario, path)) is type(literal)
-        assert value(switched(scenario, SWITCHES[name]), path) == literal
+    scenario, switch = Scenario(), versions()[name]
+    for path, other in switch.items():
+        assert value(scenario, path) != other
+        assert type(value(scenario, path)) is type(other)
+        assert value(switched(scenario, switch), path) == other
 
 
 def test_a_switched_scenario_is_a_copy():
     scenario = Scenario()
     switched(scenario, versions()[LITERAL])
     assert scenario.bfif.frames.kind == "patches"
-    assert scenario.segment.memory
+    assert scenario.segment.method == "evidence"
 
 
-def test_the_literal_paper_has_every_switch():
-    assert versions()[LITERAL].items() >= set().union(*(switch.items() for switch in SWITCHES.values()))
+def test_the_literal_paper_has_every_switch_at_every_time_step():
+    lines = set().union(*(switch.items() for switch in AS_IN_THE_PAPER.values()))
+    assert set(versions()[LITERAL].items()) == lines
+    for step in LITERAL_STEPS:
+        assert set(versions()[f"{LITERAL}, {step:g} s"].items()) == lines | {("frame_pair.step", step)}
 
 
 def test_a_switch_that_does_not_exist_is_an_error():
@@ -82,9 +85,9 @@ def test_each_version_is_scored_at_the_steps_of_the_run(recorded, small_scenario
 @pytest.mark.renders
 def test_a_version_that_fails_on_the_way_keeps_what_it_had(recorded, small_scenario, monkeypatch):
     scenario = load_scenario(small_scenario)
-    broken = {"segment.outline": "freehand"}
+    broken = {"segment.method": "freehand"}
     monkeypatch.setattr(ablation, "versions", lambda: {"broken": broken})
     times = [step["time_s"] for step in steps(recorded)]
     result = ablate(scenario, 1, recorded / "recording", times)
     assert len(result.scores["broken"]) < len(times)
-    assert "choose motion or flow" in result.failures["broken"]
+    assert "choose evidence or paper" in result.failures["broken"]

@@ -20,6 +20,7 @@ def step(number):
         depth=np.full((48, 64), 0.5, np.float32),
         mask=mask,
         frames=7,
+        confidence={300: 0.98765, 7: 0.5},
         stage_seconds={"OpticalFlow": [0.010, 0.012, 0.014]},
         ground_truth=mask,
         scores=score(mask, mask),
@@ -52,6 +53,7 @@ def test_a_step_is_written_in_the_form_that_was_promised(tmp_path):
     assert tuple(entry["scores"]) == FIGURES
     assert entry["frames"] == 7
     assert entry["objects"] == 1
+    assert entry["confidence"] == {"7": 0.5, "300": 0.988}
     assert entry["stages"]["OpticalFlow"] == {"calls": 3, "median_ms": 12.0, "p95_ms": 13.8}
 
 
@@ -68,7 +70,7 @@ def test_a_step_that_was_cut_off_is_not_listed_and_not_there(tmp_path, monkeypat
     output = RunFolder(tmp_path, {})
     output.write_step(step(0))
 
-    def stop(*_):
+    def stop(*_, **__):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("riseg_drake.app.output.draw_masks", stop)

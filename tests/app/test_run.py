@@ -11,6 +11,7 @@ from riseg_drake.evaluation.in_motion import overlap_f_of
 from riseg_drake.evaluation.scores import score
 from riseg_drake.recording.reader import RecordingReader
 from riseg_drake.robot.kinematics import PandaKinematics
+from riseg_drake.segmentation.segment_by_evidence import EvidenceParameters
 
 pytestmark = pytest.mark.renders
 STAGES = ("FrameView", "ObjectsAboveTable", "ExpectedFlow", "OpticalFlow", "BFIFGrouper", "MaskPropagator")
@@ -45,11 +46,16 @@ def test_a_run_ends_by_itself_and_leaves_a_step_for_every_interaction(finished):
 
 def test_the_area_that_is_left_at_the_end_is_that_of_what_is_not_segmented(finished):
     # As the last step's pictures have it, seen from straight above at 0.5 m; slivers beside what has an id, not
-    # wider than the rim of 5 mm, may be its outline and do not count.
+    # wider than the rim of 5 mm, may be its outline and do not count. What is in doubt is left, too.
     content = summary(finished)
+    settled = 1 / (1 + np.exp(-EvidenceParameters().settled)) - 0.001
+    doubtful = [int(a) for a, sure in content["steps"][1]["confidence"].items() if sure < settled]
     depth, mask, truth = (
         read(finished / "step_1" / f"{name}.png") for name in ("depth", "mask", "ground_truth")
     )
+    mask[np.isin(mask, doubtful)] = 0
+    # The planner closes holes in depth.
+    depth = np.where(depth > 0, depth, np.median(depth[(truth > 0) & (depth > 0)]))
     square_metres = (depth / 1e3) ** 2 / (308.1 * 307.9)
     left = (truth > 0) & (mask == 0)
     rim = 0.005 * 308 / 0.5
@@ -58,7 +64,9 @@ def test_the_area_that_is_left_at_the_end_is_that_of_what_is_not_segmented(finis
         assert content["unsettled_area_m2"] == 0
         assert square_metres[beyond].sum() < 4e-4  # no piece of it is as large as an object
         return
-    assert square_metres[beyond].sum() < content["unsettled_area_m2"] < square_metres[left].sum()
+    # To a twentieth: the planner counts on a map of its own.
+    least, most = 0.95 * square_metres[beyond].sum(), 1.05 * square_metres[left].sum()
+    assert least < content["unsettled_area_m2"] < most
     assert f"1 of 1 interactions were made, {1e4 * content['unsettled_area_m2']:.0f} cm^2" in content["end"]
 
 

@@ -39,3 +39,15 @@ def test_a_wide_picture_has_thicker_lines():
     mask = np.kron(MASK, np.ones((20, 20), np.uint16))
     picture = draw_masks(np.full((*mask.shape, 3), 200, np.uint8), mask)
     np.testing.assert_array_equal(picture[600, 402:406], [ORANGE] * 4)
+
+
+def test_confidence_stands_beside_the_number_of_its_object_and_nowhere_else():
+    color = np.full((60, 80, 3), 200, np.uint8)
+    plain, sure = draw_masks(color, MASK), draw_masks(color, MASK, confidence={2: 0.97})
+    np.testing.assert_array_equal(draw_masks(color, MASK, confidence={}), plain)
+    changed = (plain != sure).any(-1)
+    assert changed.any()
+    assert np.nonzero(changed)[1].min() > 45  # the number 2 stands in the middle of its object, at 50
+    assert not (
+        draw_masks(color, MASK, numbers=False, confidence={2: 0.97}) != draw_masks(color, MASK, False)
+    ).any()

@@ -10,7 +10,7 @@ from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.geometry.se3 import exp_se3, translation
 from riseg_drake.segmentation.alignment import AlignmentParameters, align_motions
-from riseg_drake.segmentation.motion_labels import MotionLabelParameters, cut_pieces
+from riseg_drake.segmentation.keyframe import KeyframeParameters, make_keyframe
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.noise import MeasurementNoise
 from tests.segmentation.drawn_scene import (
@@ -56,14 +56,7 @@ class Moved:
             label_0[1::4, 1::4],
         )
         above_0 = standing(self.pair.reference, label_0 > 0)
-        pieces = cut_pieces(
-            self.pair.reference,
-            above_0,
-            np.zeros_like(above_0.mask, np.uint16),
-            MeasurementNoise(),
-            MotionLabelParameters(),
-        )
-        self.edges = pieces.edges
+        self.edges = make_keyframe(self.pair.reference, above_0, MeasurementNoise(), KeyframeParameters()).edges
         self.motion_C0 = motion_seen_from(CAMERAS[0], PLACES[0], after[0])
         v, u = self.edges.surface.pixel
         self.p_C0Q = self.edges.p_C0Q[label_0[v, u] == 1]
@@ -97,19 +90,6 @@ def test_a_motion_that_is_right_stays_right() -> None:
     moved = Moved([Texture(1), Texture(2)])
     (aligned,) = moved.aligned(moved.motion_C0)
     assert moved.error(aligned) < 0.1
-
-
-def test_a_blank_body_gets_a_motion_though_nobody_proposed_one() -> None:
-    moved = Moved([Blank(90.0), Texture(2)], to=(-0.0585, 0.001, 0.03))
-    (found,) = moved.aligned()
-    assert moved.error(found) < 0.25
-
-
-def test_where_everything_is_explained_no_motion_is_added() -> None:
-    still = Moved([Blank(90.0), Texture(2)], to=(-0.06, 0.0, 0.0))
-    assert len(still.aligned()) == 0
-    moved = Moved([Blank(90.0), Texture(2)])
-    assert len(moved.aligned(moved.motion_C0)) == 1
 
 
 def test_two_starts_that_end_in_one_motion_are_one() -> None:

@@ -14,7 +14,7 @@ def two_halves(height: np.ndarray, color: np.ndarray, depth: np.ndarray | None =
     """40 x 40 pixels, cut in the middle from top to bottom."""
     label = np.zeros((40, 40), np.intp)
     label[:, 20:] = 1
-    cut = Superpixels(label, 2, np.array([[0, 1]]), np.array([40.0]), np.array([0.0]))
+    cut = Superpixels(label, 2, np.array([[0, 1]]), np.array([40.0]))
     return SimpleNamespace(
         region=(slice(0, 40), slice(0, 40)),
         count=2,

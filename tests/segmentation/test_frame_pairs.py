@@ -47,6 +47,15 @@ def test_consecutive_pairs_are_the_papers() -> None:
     assert references(frames, [0, 9, 0, 30, 2], kind="consecutive") == [0, 0, 1, 2, 3]
 
 
+@pytest.mark.parametrize(
+    ("step", "expected"),
+    [(1 / 15, [0, 0, 1, 2, 3, 4, 5]), (2 / 15, [0, 0, 0, 2, 2, 4, 4]), (0.19, [0, 0, 0, 0, 3, 3, 3])],
+)
+def test_a_time_step_pairs_frames_that_far_apart_and_those_between_with_the_one_before(step, expected) -> None:
+    frames = [frame(k) for k in range(7)]
+    assert references(frames, [5.0] * 7, kind="consecutive", step=step) == expected
+
+
 def test_the_reference_stays_while_things_move_and_is_renewed_beyond_the_span() -> None:
     frames = [frame(k) for k in range(7)]
     share = 10.0 / CAMERA.width

@@ -4,15 +4,12 @@ import numpy as np
 import pytest
 
 from riseg_drake.geometry.se3 import exp_se3, inverse, log_se3, move_points, translation
-from riseg_drake.segmentation.bfif import no_groups
 from riseg_drake.segmentation.body_frames import BodyFrames
 from riseg_drake.segmentation.motions import (
     MotionParameters,
     flow_difference,
     group_motions,
     merge_equal_motions,
-    motion_gaps,
-    with_earlier_motions,
 )
 from riseg_drake.segmentation.twists import point_precision
 
@@ -99,14 +96,3 @@ def test_two_shifts_differ_by_focal_length_over_distance() -> None:
     p = np.array([[0.0, 0.0, 0.5], [0.1, 0.0, 0.5]])
     X = translation(np.array([0.001, 0.0, 0.0]))
     assert flow_difference(p, X, np.eye(4), FOCAL_LENGTH) == pytest.approx(1.2)
-    gaps = motion_gaps(p, np.array([X, X @ X]), FOCAL_LENGTH)
-    np.testing.assert_allclose(gaps, [[0, 1.2, 2.4], [1.2, 0, 1.2], [2.4, 1.2, 0]], atol=1e-9)
-
-
-def test_what_moved_before_keeps_its_motion_unless_a_group_has_it_now() -> None:
-    earlier = [about_centre(0.05, 0.004, 0), about_centre(0, -0.004, 0)]
-    kept = with_earlier_motions(no_groups(), earlier, FOCAL_LENGTH, MotionParameters())
-    np.testing.assert_allclose(kept, earlier)
-    twice = with_earlier_motions(no_groups(), [*earlier, earlier[0]], FOCAL_LENGTH, MotionParameters())
-    assert len(twice) == 2
-    assert with_earlier_motions(no_groups(), [], FOCAL_LENGTH, MotionParameters()).shape == (0, 4, 4)

@@ -91,3 +91,12 @@ def test_what_the_camera_has_left_behind_has_no_flow() -> None:
     scene, places = DrawnScene([(0.07, 0.06, 0.03)]), [planar(0, 0)]
     pair, label_0, _ = scene.pair((looking_down(), looking_down(x=0.5)), (places, places))
     assert np.isnan(flow_around(standing(pair.reference, label_0 > 0), pair, DisFlow())).all()
+
+
+def test_of_a_corner_that_both_images_hardly_share_no_flow_is_asked() -> None:
+    cameras = looking_down(), looking_down(x=0.016, y=-0.016)
+    pair, label_0, _ = DrawnScene([]).pair(cameras, ([], []))
+    corner = np.zeros(label_0.shape, bool)
+    corner[:4, :4] = True
+    # Eleven pixels up and to the left: three by three are left, which DIS refuses.
+    assert np.isnan(flow_around(standing(pair.reference, corner), pair, DisFlow())).all()

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from riseg_drake.geometry.rgbd import FramePair
-from riseg_drake.segmentation.association import UNKNOWN
-from riseg_drake.segmentation.propagation import carry_labels, nearest_label
+from riseg_drake.segmentation.propagation import UNKNOWN, carry_labels, nearest_label
 from tests.segmentation.drawn_scene import (
     CAMERA,
     DrawnScene,

@@ -5,20 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from riseg_drake.segmentation.segment import SegmentParameters
-from riseg_drake.segmentation.segment_by_evidence import nothing_evident, segment_by_evidence
-from tests.segmentation.algorithm import Algorithm
 from tests.segmentation.drawn_scene import intersection_over_union
-
-BY_EVIDENCE = SegmentParameters(method="evidence")
+from tests.segmentation.watched import Watcher
 
 
 @pytest.fixture(scope="module")
 def watched(pushed):
-    """The algorithm after the push and a rest, its answers, and the truth, frame by frame."""
-    algorithm = Algorithm(segment=BY_EVIDENCE)
+    """What is answered during a push and a rest, and the truth, frame by frame."""
+    watcher = Watcher()
     shown = [*pushed, *resting(pushed)]
-    return algorithm, [algorithm.take(frame) for frame, _ in shown], [label for _, label in shown]
+    return [watcher.take(frame).segmentation for frame, _ in shown], [label for _, label in shown]
 
 
 def resting(pushed) -> list:
@@ -29,7 +25,7 @@ def resting(pushed) -> list:
 
 @pytest.mark.renders
 def test_a_body_that_is_pushed_gets_an_id_in_motion_and_its_neighbours_none(watched) -> None:
-    _, answers, truths = watched
+    answers, truths = watched
     for answer, truth in list(zip(answers, truths, strict=True))[9:]:
         assert intersection_over_union(answer.mask > 0, truth == 1) > 0.9
         assert np.mean(answer.mask[np.isin(truth, [2, 3])] == 0) > 0.97
@@ -39,7 +35,7 @@ def test_a_body_that_is_pushed_gets_an_id_in_motion_and_its_neighbours_none(watc
 def test_before_a_still_camera_what_went_far_is_decided_and_the_frame_becomes_the_keyframe(
     watched,
 ) -> None:
-    _, answers, truths = watched
+    answers, truths = watched
     assert answers[0].belief.keyframe.frame.sequence == 0
     keyframes = [answer.belief.keyframe.frame.sequence for answer in answers]
     # After 15 pixels of motion; in the rest after that nothing is new.
@@ -51,21 +47,7 @@ def test_before_a_still_camera_what_went_far_is_decided_and_the_frame_becomes_th
 
 
 @pytest.mark.renders
-def test_the_same_pair_again_changes_nothing(watched) -> None:
-    algorithm, answers, _ = watched
-    pair, _, _, groups, above_0, above_1, parameters, bfif = algorithm.inputs
-    again = segment_by_evidence(answers[-1], pair, groups, above_0, above_1, parameters.evidence, bfif)
-    assert again is answers[-1]
-
-
-@pytest.mark.renders
 def test_the_same_frames_give_the_same_masks_to_the_byte(watched, pushed) -> None:
-    again = Algorithm(segment=BY_EVIDENCE)
-    for (frame, _), answer in zip([*pushed, *resting(pushed)], watched[1], strict=True):
+    again = Watcher()
+    for (frame, _), answer in zip([*pushed, *resting(pushed)], watched[0], strict=True):
         assert again.take(frame).mask.tobytes() == answer.mask.tobytes()
-
-
-def test_at_first_nothing_is_segmented() -> None:
-    start = nothing_evident((3, 4))
-    assert not start.mask.any()
-    assert start.object_ids == ()

@@ -97,22 +97,6 @@ def test_two_halves_share_one_border_of_the_images_height() -> None:
     pieces = cut(color, np.ones((20, 40), bool), 20)
     np.testing.assert_array_equal(pieces.borders, [[0, 1]])
     assert pieces.length[0] == pytest.approx(20, abs=2)
-    assert pieces.contrast[0] > 50
-
-
-def test_a_border_on_a_blank_surface_has_no_contrast_and_one_on_an_edge_has() -> None:
-    color = flat()
-    color[:, 40:] = 190
-    pieces = cut(color, np.ones((HEIGHT, WIDTH), bool), 10)
-    side = np.array([np.mean(np.nonzero(pieces.label == k)[1]) > 40 for k in range(pieces.count)])
-    over_edge = side[pieces.borders[:, 0]] != side[pieces.borders[:, 1]]
-    # Not at the image's own rim, where there is nothing beyond to compare with.
-    u = np.array([np.mean(np.nonzero(pieces.label == k)[1]) for k in range(pieces.count)])
-    v = np.array([np.mean(np.nonzero(pieces.label == k)[0]) for k in range(pieces.count)])
-    inner = (v[pieces.borders] > 10).all(1) & (v[pieces.borders] < 50).all(1)
-    far = (np.abs(u[pieces.borders] - 40) > 12).all(1)
-    assert np.median(pieces.contrast[over_edge & inner]) > 40
-    assert pieces.contrast[~over_edge & inner & far].max() < 2
 
 
 def test_unknown_height_is_no_obstacle() -> None:

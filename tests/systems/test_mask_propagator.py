@@ -6,8 +6,9 @@ from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
 
 from riseg_drake.geometry.rgbd import NO_PAIR, FramePair
-from riseg_drake.segmentation.bfif import BFIFParameters
-from riseg_drake.segmentation.segment import Segmentation, SegmentParameters, nothing_segmented, segment
+from riseg_drake.segmentation.bfif import BFIFParameters, no_groups
+from riseg_drake.segmentation.segment import SegmentParameters, segment
+from riseg_drake.segmentation.segmentation import Segmentation, nothing_segmented
 from riseg_drake.systems import mask_propagator
 from riseg_drake.systems.mask_propagator import MaskPropagator
 from tests.segmentation.drawn_scene import CAMERA
@@ -80,20 +81,23 @@ def test_at_first_the_mask_is_empty(payloads, calls) -> None:
 
 
 def test_the_mask_is_what_the_function_makes_of_the_inputs(payloads) -> None:
-    alone = Alone(payloads)
-    mask = alone.at(OFFSET + 1e-4)
-    expected = segment(
-        nothing_segmented(CAMERA.shape),
-        payloads.pair,
-        payloads.expected_flow,
-        payloads.optical_flow,
-        payloads.groups,
-        payloads.above_0,
-        payloads.above_1,
-        SegmentParameters(),
-        BFIFParameters(),
-    )
-    np.testing.assert_array_equal(mask, expected.mask)
+    alone, expected = Alone(payloads), nothing_segmented(CAMERA.shape)
+    first = FramePair(payloads.pair.reference, payloads.pair.reference)
+    for number, (pair, groups) in enumerate([(first, no_groups()), (payloads.pair, payloads.groups)]):
+        alone.show(pair=pair, groups=groups)
+        mask = alone.at(number * PERIOD + OFFSET + 1e-4)
+        expected = segment(
+            expected,
+            pair,
+            payloads.expected_flow,
+            payloads.optical_flow,
+            groups,
+            payloads.above_0,
+            payloads.above_1,
+            SegmentParameters(),
+            BFIFParameters(),
+        )
+        np.testing.assert_array_equal(mask, expected.mask)
     assert mask.any()
     assert isinstance(alone.segmentation, Segmentation)
     assert alone.segmentation.object_ids == expected.object_ids
@@ -124,13 +128,17 @@ def test_before_the_first_pair_nothing_happens(payloads, calls) -> None:
     assert not alone.at(3.5 * PERIOD).any()
     assert calls == []
     alone.show(pair=payloads.pair)
-    assert alone.at(5 * PERIOD).any()
+    alone.at(5 * PERIOD)
+    assert calls == [2]
 
 
 def test_its_parameters_are_those_given(payloads) -> None:
-    with pytest.raises(ValueError, match="reference or flow"):
-        Alone(payloads, SegmentParameters(propagation="none")).at(PERIOD)
+    with pytest.raises(ValueError, match="evidence or paper"):
+        Alone(payloads, SegmentParameters(method="none")).at(PERIOD)
 
 
 def test_two_runs_with_the_same_inputs_give_the_same_bytes(payloads) -> None:
-    assert Alone(payloads).at(PERIOD).tobytes() == Alone(payloads).at(PERIOD).tobytes()
+    literal = SegmentParameters(method="paper")  # which labels what moves in the first pair
+    masks = [Alone(payloads, literal).at(PERIOD) for _ in range(2)]
+    assert masks[0].any()
+    assert masks[0].tobytes() == masks[1].tobytes()

@@ -9,17 +9,19 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, EventStatus, LeafSystem
 from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
 
-from riseg_drake.segmentation.optical_flow import DisFlow
-from riseg_drake.systems import bfif_grouper, expected_flow, mask_propagator, objects_above_table
-from riseg_drake.systems.bfif_grouper import BFIFGrouper
-from riseg_drake.systems.expected_flow import ExpectedFlow
-from riseg_drake.systems.frame_pair import FramePairMemory
+from riseg_drake.app.scenario import Scenario
+from riseg_drake.app.segmentation_block import add_stages
+from riseg_drake.systems import (
+    bfif_grouper,
+    camera_motion,
+    expected_flow,
+    mask_propagator,
+    objects_above_table,
+    optical_flow,
+)
 from riseg_drake.systems.frame_view import FrameView
-from riseg_drake.systems.mask_propagator import MaskPropagator
-from riseg_drake.systems.objects_above_table import ObjectsAboveTable
-from riseg_drake.systems.optical_flow import OpticalFlow
-from tests.segmentation.algorithm import Algorithm
 from tests.segmentation.drawn_scene import CAMERA, looking_down
+from tests.segmentation.watched import Watcher
 
 PERIOD = 1 / 15
 JUST_BEFORE = 0.01
@@ -108,6 +110,8 @@ def counts(monkeypatch) -> Counter:
         monkeypatch.setattr(module, name, counted)
 
     count(objects_above_table, "objects_above_table")
+    count(optical_flow, "flow_around")
+    count(camera_motion, "settled_pair")
     count(expected_flow, "expected_flow")
     count(bfif_grouper, "group_body_frames")
     count(mask_propagator, "segment")
@@ -115,56 +119,28 @@ def counts(monkeypatch) -> Counter:
 
 
 class Chain:
-    """The film, the wired stages and the reader."""
+    """The film, Alg. 2 wired as in the product, and the reader."""
 
     def __init__(self, frames, counts: Counter, ticks: int = 1) -> None:
         builder = DiagramBuilder()
         film = builder.AddSystem(Film(frames, ticks))
-        method = DisFlow()
-
-        def flow(color_0: np.ndarray, color_1: np.ndarray) -> np.ndarray:
-            counts["optical_flow"] += 1
-            return method(color_0, color_1)
 
         def forward(q: np.ndarray) -> np.ndarray:
             counts["forward_kinematics"] += 1
             return looking_down(q[0])
 
         nobody = np.zeros(CAMERA.shape, bool)
-        view = builder.AddSystem(FrameView(CAMERA, forward, lambda q: nobody))
-        above = builder.AddSystem(ObjectsAboveTable())
-        memory = builder.AddSystem(FramePairMemory(PERIOD, 0.001))
-        expected = builder.AddSystem(ExpectedFlow())
-        optical = builder.AddSystem(OpticalFlow(flow))
-        grouper = builder.AddSystem(BFIFGrouper(seed=0))
-        self.propagator = builder.AddSystem(MaskPropagator(CAMERA, PERIOD, 0.0015))
-        for source, output, target, port in (
-            (film, "color_image", view, "color_image"),
-            (film, "depth_image", view, "depth_image"),
-            (film, "image_time", view, "image_time"),
-            (film, "position", view, "position"),
-            (view, "frame", above, "frame"),
-            (view, "frame", memory, "frame"),
-            (above, "above_table", memory, "above_table"),
-            (grouper, "flow_span", memory, "flow_span"),
-            (memory, "pair", expected, "pair"),
-            (memory, "pair", optical, "pair"),
-            (memory, "pair", grouper, "pair"),
-            (memory, "pair", self.propagator, "pair"),
-            (memory, "above_table_reference", grouper, "above_table"),
-            (memory, "above_table_reference", self.propagator, "above_table_reference"),
-            (memory, "above_table", self.propagator, "above_table"),
-            (expected, "expected_flow", grouper, "expected_flow"),
-            (expected, "expected_flow", self.propagator, "expected_flow"),
-            (optical, "optical_flow", grouper, "optical_flow"),
-            (optical, "optical_flow", self.propagator, "optical_flow"),
-            (grouper, "groups", self.propagator, "groups"),
-        ):
-            builder.Connect(source.GetOutputPort(output), target.GetInputPort(port))
+        view = FrameView(CAMERA, forward, lambda q: nobody)
+        block = add_stages(builder, Scenario(), view, PERIOD, seed=0)
+        for name, port in block.inputs.items():
+            builder.Connect(film.GetOutputPort(name), port)
+        self.propagator = block.outputs["mask"].get_system()
         ports = [
-            system.get_output_port(k)
-            for system in (memory, expected, optical, grouper, self.propagator)
-            for k in range(system.num_output_ports())
+            stage.get_output_port(k)
+            for stage in block.stages
+            if stage is not view  # which follows the arm's tremble, read or not
+            and stage.get_name() != "ObjectsAboveTable"
+            for k in range(stage.num_output_ports())
         ]
         self.reader = builder.AddSystem(Reader(ports))
         for k, port in enumerate(ports):
@@ -180,7 +156,8 @@ STAGES = {
     "forward_kinematics",
     "objects_above_table",
     "expected_flow",
-    "optical_flow",
+    "flow_around",
+    "settled_pair",
     "group_body_frames",
     "segment",
 }
@@ -199,13 +176,13 @@ def test_stages_do_not_work_again_where_the_camera_is_slower_than_the_diagram(dr
     chain = Chain(frames, counts, ticks)
     for number in range(1, len(frames) + 1):
         chain.simulator.AdvanceTo(number * ticks * PERIOD - JUST_BEFORE)
-        for stage in ("optical_flow", "expected_flow", "group_body_frames", "segment"):
+        for stage in ("flow_around", "settled_pair", "expected_flow", "group_body_frames", "segment"):
             assert counts[stage] == number, stage
 
 
 def test_the_wired_systems_give_the_masks_that_the_functions_give(drawn_frames, counts) -> None:
-    chain, algorithm = Chain(drawn_frames, counts), Algorithm()
+    chain, watcher = Chain(drawn_frames, counts), Watcher()
     for number, frame in enumerate(drawn_frames):
         chain.simulator.AdvanceTo((number + 1) * PERIOD - JUST_BEFORE)
-        np.testing.assert_array_equal(chain.mask(), algorithm.take(frame).mask)
+        np.testing.assert_array_equal(chain.mask(), watcher.take(frame).mask)
     assert chain.mask().any()

@@ -1,0 +1,51 @@
+"""The one memory of frames: (I_t-1, I_t, theta_t-1, theta_t) and what stands on the table in both."""
+
+from dataclasses import dataclass, field, replace
+
+from riseg_drake.geometry.rgbd import NO_PAIR, Frame, FramePair, Immutable
+from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE, AboveTable
+from riseg_drake.segmentation.camera_motion import CameraMotionParameters, PoseError, renewed_pose_error
+from riseg_drake.segmentation.exposure import with_equal_exposure
+from riseg_drake.segmentation.frame_pairs import FramePairParameters, next_pair
+
+
+@dataclass(frozen=True)
+class RememberedPair(Immutable):
+    """The pair, and objMask of its two frames."""
+
+    pair: FramePair = NO_PAIR
+    above_0: AboveTable = NOTHING_ABOVE_TABLE
+    above_1: AboveTable = NOTHING_ABOVE_TABLE
+    pose_error: PoseError = field(default_factory=PoseError)
+    """Of the camera's motion, as the table shows it."""
+
+
+def with_frame(
+    memory: RememberedPair,
+    frame: Frame,
+    above: AboveTable,
+    flow_span: float,
+    pairs: FramePairParameters,
+    camera_motion: CameraMotionParameters,
+) -> RememberedPair:
+    """The memory with one more frame, which gets the next number; the memory itself if the frame is not newer.
+
+    Args:
+        memory: before.
+        frame: the newest one.
+        above: its objMask.
+        flow_span: effective flow found in the pair that is in memory, pixels.
+        pairs: which frame is its partner.
+        camera_motion: how the poses' error is estimated.
+    """
+    if frame.time <= memory.pair.current.time:  # as that of NO_FRAME always is
+        return memory
+    frame = replace(frame, sequence=memory.pair.current.sequence + 1)
+    if memory.pair is NO_PAIR:
+        return RememberedPair(next_pair(NO_PAIR, frame, 0.0, pairs), above, above, memory.pose_error)
+    pair = with_equal_exposure(next_pair(memory.pair, frame, flow_span, pairs))
+    above_0 = memory.above_0 if pair.reference is memory.pair.reference else memory.above_1
+    error = renewed_pose_error(
+        memory.pose_error, memory.pair.current, memory.above_1, pair.current, above, camera_motion
+    )
+    return RememberedPair(pair, above_0, above, error)

@@ -1,0 +1,71 @@
+"""L_t, and what must be remembered for L_t+1: the one state of Alg. 2's line 7."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.rgbd import Frame, Immutable
+from riseg_drake.segmentation.belief import Belief, Bodies
+from riseg_drake.segmentation.memory import Memory
+from riseg_drake.segmentation.propagation import UNKNOWN
+
+
+@dataclass(frozen=True)
+class Segmentation(Immutable):
+    """L_t, and what must be remembered for L_t+1."""
+
+    sequence: int
+    """Number of the frame that `label` belongs to; -1 before the first."""
+    label: NDArray[np.uint16]
+    """[H, W], ids, UNKNOWN where something stands that has not moved yet, 0 for table and robot."""
+    margin: Mapping[int, float] = field(default_factory=dict)
+    """For each id, by how many nats a border the partition is better than the next best one."""
+    settled: float = 0.0
+    """The margin that leaves no doubt."""
+    belief: Belief | None = None
+    """As of the keyframe; None before anything stood on the table."""
+    bodies: Mapping[int, Bodies] = field(default_factory=dict)
+    """By frame number, since the pair's reference: the bodies, and how they moved since the keyframe."""
+    frame: Frame | None = None
+    """The last one."""
+    still_since: float | None = None
+    """s; None while something moves."""
+    decided: bool = True
+    """Whether the present rest has been looked at."""
+    memory: Memory = field(default_factory=dict)
+    """Points of objects that the keyframe does not see, as of its time."""
+    at_reference: tuple[int, NDArray[np.uint16]] | None = None
+    """Number of the pair's reference frame and its label [H, W]: all that the literal paper remembers."""
+
+    @property
+    def mask(self) -> NDArray[np.uint16]:
+        """L_t [H, W]: object ids, 0 = background."""
+        return np.where(self.label == UNKNOWN, np.uint16(0), self.label)
+
+    @property
+    def settled_mask(self) -> NDArray[np.uint16]:
+        """L_t [H, W] without the objects in doubt: what needs no further push."""
+        doubtful = [a for a, margin in self.margin.items() if margin < self.settled]
+        mask = self.mask
+        return np.where(np.isin(mask, doubtful), np.uint16(0), mask) if doubtful else mask
+
+    @property
+    def confidence(self) -> dict[int, float]:
+        """For each id the probability, by the margin, that it is one object and all of it."""
+        return {a: float(1 / (1 + np.exp(self.settled - 2 * margin))) for a, margin in self.margin.items()}
+
+    @property
+    def object_ids(self) -> tuple[int, ...]:
+        """All ids that are held now, in the view or not."""
+        ids = set(self.memory) | set(np.unique(self.mask).tolist()) - {0}
+        if self.belief is not None:
+            newest = self.bodies[max(self.bodies)].body if self.bodies else self.belief.body
+            ids |= set(np.unique(newest[newest > 0]).tolist())
+        return tuple(sorted(int(a) for a in ids))
+
+
+def nothing_segmented(shape: tuple[int, int]) -> Segmentation:
+    """L_0: an empty mask [H, W] (Alg. 1, line 3)."""
+    return Segmentation(sequence=-1, label=np.zeros(shape, np.uint16))
