@@ -131,5 +131,5 @@ def test_push_tried_in_vain_is_not_proposed_again(panda, q_observe, scene):
 def test_ports_have_the_names_of_the_contract(panda):
     planner = PushPlanner(panda)
     names = [planner.get_input_port(i).get_name() for i in range(planner.num_input_ports())]
-    assert names == ["pair", "above_table", "mask", "position", "tried_pushes"]
+    assert names == ["pair", "above_table", "mask", "position", "tried_pushes", "found"]
     assert planner.get_output_port().get_name() == "decision"
