@@ -66,10 +66,9 @@ def find_clusters(
         pieces = [to_segment & (doubtful == a) for a in np.unique(doubtful[to_segment])]
     divisions = []
     for piece in pieces:
-        whole = (
-            doubtful is None and parameters.by_piece and concavity(piece, table.cell) <= parameters.concavity
-        )
-        least = HALVES if doubtful is not None or parameters.by_piece else 1
+        halved = doubtful is not None
+        whole = not halved and parameters.by_piece and concavity(piece, table.cell) <= parameters.concavity
+        least = HALVES if halved or parameters.by_piece else 1
         p_WQ = table.points(piece)
         divisions.append(clusterings(p_WQ, parameters.clustering, rng, one_first=whole, least=least))
     current: list[Clustering | None] = [None] * len(pieces)

@@ -76,11 +76,8 @@ def find_action(
     candidates = 0
     # What has never moved comes before what is in doubt; alone before with others.
     known = replace(table, segmented=table.segmented | (doubtful > 0), doubtful=None)
-    for to_segment, scene, alone in (
-        (unmoved, known, True),
-        (unmoved, known, False),
-        (doubtful > 0, table, True),
-    ):
+    stages = ((unmoved, known, True), (unmoved, known, False), (doubtful > 0, table, True))
+    for to_segment, scene, alone in stages:
         if not to_segment.any() or not (alone or parameters.validity.with_others):
             continue
         for clusters in find_clusters(to_segment, scene, parameters.clusters, rng, scene.doubtful):  # line 6
@@ -201,7 +198,7 @@ def valid_pushes_of(
         Criterion.HIGH_ENOUGH: contacts.high_enough,
         Criterion.ONLY_TARGET: contacts.only_target & (contacts.transmitted > 0),
         Criterion.STAYS_IN_WORK_AREA: stays_in_work_area(direction_W, P, table, validity.d_push),
-        Criterion.NOT_IN_VAIN: gain > 0,
+        Criterion.NOT_IN_VAIN: gain > (0.0 if table.doubtful is None else parameters.gain.least_in_doubt),
     }
     tallest = float(table.height.max())
     cluster_W = table.points(P)

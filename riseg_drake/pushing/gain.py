@@ -31,6 +31,8 @@ class GainParameters:
     """What turning the camera by half a turn takes off: it costs time, and takes the scene out of view."""
     tries: int = 2
     """What is still one after so many pushes is not pushed again."""
+    least_in_doubt: float = 0.1
+    """What is in doubt is not pushed for less than this: the push stirs what is well known, too."""
     tried_distance: float = 0.03
     """Distance, m, over which a push is like one that was made."""
     least_novelty: float = 0.17
