@@ -26,7 +26,7 @@ class ClusteringParameters:
     blob would give; where no k does, everything is one cluster."""
     sample: int = 400
     """Points that take part in finding the centers; all are then given to the nearest center."""
-    restarts: int = 4
+    restarts: int = 2
     """K-Means and K-Medoids keep the best of this many random starts."""
     bandwidth: float = 0.03
     """Radius of Mean Shift's window, m."""
