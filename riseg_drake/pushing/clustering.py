@@ -34,8 +34,6 @@ class ClusteringParameters:
     """How many finer clusterings may follow where the chosen one has no valid push."""
 
 
-_SETTLED = 1e-4  # m; centers that move by less have been found
-
 METHODS = ("k-means", "k-medoids", "mean-shift")
 
 
@@ -126,10 +124,9 @@ def _k_means(
             count = np.bincount(nearest, minlength=k)[:, None]
             sums = np.stack([np.bincount(nearest, x, k) for x in points.T], axis=1)
             updated = np.where(count > 0, sums / np.maximum(count, 1), centers)
-            settled = np.abs(updated - centers).max() < _SETTLED
-            centers = updated
-            if settled:
+            if np.array_equal(updated, centers):
                 break
+            centers = updated
         inertia = float(cdist(points, centers, "sqeuclidean").min(axis=1).sum())
         if inertia < best[0]:
             best = inertia, centers

@@ -198,7 +198,7 @@ def valid_pushes_of(
         Criterion.HIGH_ENOUGH: contacts.high_enough,
         Criterion.ONLY_TARGET: contacts.only_target & (contacts.transmitted > 0),
         Criterion.STAYS_IN_WORK_AREA: stays_in_work_area(direction_W, P, table, validity.d_push),
-        Criterion.NOT_IN_VAIN: gain > (0.0 if table.doubtful is None else parameters.gain.least_in_doubt),
+        Criterion.NOT_IN_VAIN: gain > (0.0 if table.doubtful is None else parameters.gain.least),
     }
     tallest = float(table.height.max())
     cluster_W = table.points(P)
