@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,9 +31,7 @@ def boundary(
     how far the nearest object is from the spots behind them, where the pusher would have to stand.
     """
     parameters = parameters or BoundaryParameters()
-    free = ~table.objects
-    beside_free = cv2.dilate(free.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    p_WB = table.points(cluster & beside_free)
+    p_WB = table.points(cluster & table.beside_free)
     offset = p_WB - center_W
     radius = np.linalg.norm(offset, axis=1)
     p_WB, offset, radius = p_WB[radius > 0], offset[radius > 0], radius[radius > 0]
@@ -47,9 +44,8 @@ def boundary(
     outermost = order[np.unique(sector[order], return_index=True)[1]]
     p_WB, outward = p_WB[outermost], offset[outermost] / radius[outermost, None]
 
-    to_object = table.cell * cv2.distanceTransform(free.astype(np.uint8), cv2.DIST_L2, 5)
     behind = np.linspace(0.0, parameters.room_behind, 5)[1:]
     spots = p_WB[:, None] + behind[:, None] * outward[:, None]
     inside = table.lookup(np.ones_like(table.objects), spots)
-    room = np.where(inside, table.lookup(to_object, spots), parameters.room_behind).sum(axis=1)
+    room = np.where(inside, table.lookup(table.to_object, spots), parameters.room_behind).sum(axis=1)
     return p_WB[np.argsort(-room, kind="stable")]

@@ -6,13 +6,11 @@ could be used as well. All work on points of the table in metres.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
-from sklearn.cluster import KMeans, MeanShift
-from threadpoolctl import ThreadpoolController
+from sklearn.cluster import MeanShift
 
 
 @dataclass
@@ -26,13 +24,13 @@ class ClusteringParameters:
     elbow: float = 0.25
     """How sharply the curve ln(inertia) over ln(k) must bend at k beyond what splitting one compact
     blob would give; where no k does, everything is one cluster."""
-    sample: int = 2000
+    sample: int = 400
     """Points that take part in finding the centers; all are then given to the nearest center."""
     restarts: int = 2
     """K-Means and K-Medoids keep the best of this many random starts."""
     bandwidth: float = 0.03
     """Radius of Mean Shift's window, m."""
-    finer: int = 3
+    finer: int = 2
     """How many finer clusterings may follow where the chosen one has no valid push."""
 
 
@@ -117,18 +115,22 @@ def elbow(inertia: NDArray, threshold: float) -> int:
 def _k_means(
     points: NDArray, k: int, restarts: int, rng: np.random.Generator
 ) -> tuple[NDArray[np.float64], float]:
-    """Centers [k, 2] and inertia (MacQueen 1967, with k-means++ starts)."""
-    seed = int(rng.integers(2**31))
-    # Several threads would share the sums, which then come out differently in their last bits.
-    with _threads().limit(limits=1):
-        fit = KMeans(n_clusters=k, n_init=restarts, max_iter=60, random_state=seed).fit(points)
-    return fit.cluster_centers_, float(fit.inertia_)
-
-
-@cache
-def _threads() -> ThreadpoolController:
-    """Looked up once: a look through all loaded libraries takes as long as the clustering."""
-    return ThreadpoolController()
+    """Centers [k, 2] and inertia (Lloyd's iterations, with k-means++ starts)."""
+    best: tuple[float, NDArray] = (np.inf, points[:k])
+    for _ in range(restarts):
+        centers = points[_spread_start(points, k, rng)]
+        for _ in range(60):
+            nearest = np.argmin(cdist(points, centers, "sqeuclidean"), axis=1)
+            count = np.bincount(nearest, minlength=k)[:, None]
+            sums = np.stack([np.bincount(nearest, x, k) for x in points.T], axis=1)
+            updated = np.where(count > 0, sums / np.maximum(count, 1), centers)
+            if np.array_equal(updated, centers):
+                break
+            centers = updated
+        inertia = float(cdist(points, centers, "sqeuclidean").min(axis=1).sum())
+        if inertia < best[0]:
+            best = inertia, centers
+    return best[1], best[0]
 
 
 def _k_medoids(
@@ -145,7 +147,7 @@ def _k_medoids(
     distance = cdist(candidates, candidates)
     best: tuple[float, NDArray] = (np.inf, np.arange(k))
     for _ in range(restarts):
-        medoids = _spread_start(distance, k, rng)
+        medoids = _spread_start(candidates, k, rng)
         for _ in range(30):
             nearest = np.argmin(distance[:, medoids], axis=1)
             updated = medoids.copy()
@@ -163,12 +165,13 @@ def _k_medoids(
     return centers, float((cdist(points, centers).min(axis=1) ** 2).sum())
 
 
-def _spread_start(distance: NDArray, k: int, rng: np.random.Generator) -> NDArray[np.intp]:
-    """k different points, drawn one by one in proportion to the squared distance to those before."""
-    chosen = [int(rng.integers(len(distance)))]
+def _spread_start(points: NDArray, k: int, rng: np.random.Generator) -> NDArray[np.intp]:
+    """k different points of [N, 2], drawn one by one in proportion to the squared distance to those before."""
+    chosen = [int(rng.integers(len(points)))]
+    weight = np.full(len(points), np.inf)
     while len(chosen) < k:
-        weight = distance[:, chosen].min(axis=1) ** 2
-        chosen.append(int(rng.choice(len(distance), p=weight / weight.sum())))
+        weight = np.minimum(weight, cdist(points, points[chosen[-1:]], "sqeuclidean")[:, 0])
+        chosen.append(int(rng.choice(len(points), p=weight / weight.sum())))
     return np.array(chosen)
 
 

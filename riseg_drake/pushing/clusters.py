@@ -16,6 +16,10 @@ from numpy.typing import NDArray
 from riseg_drake.pushing.clustering import Clustering, ClusteringParameters, clusterings
 from riseg_drake.pushing.table_map import TableMap
 
+HALVES = 2
+"""A piece with a nook that no neck divides is at least this many clusters: half an object moves as well
+as a whole one, but two objects pushed together look like one."""
+
 
 @dataclass
 class ClustersParameters:
@@ -32,9 +36,6 @@ class ClustersParameters:
     concavity: float = 0.008
     """A piece whose outline nowhere recedes more than this from its convex hull, m, is one cluster:
     where things touch, there mostly is a nook."""
-    least_with_nook: int = 2
-    """A piece with a nook that no neck divides is at least this many clusters: half an object moves as
-    well as a whole one, but two objects pushed together look like one."""
     clustering: ClusteringParameters = field(default_factory=ClusteringParameters)
 
 
@@ -53,13 +54,21 @@ def find_clusters(
     table: TableMap,
     parameters: ClustersParameters,
     rng: np.random.Generator,
+    doubtful: NDArray[np.int_] | None = None,
 ) -> Iterator[list[Cluster]]:
-    """centers and clusterPoints of objsToSegment [rows, columns]; then, if asked again, ever finer ones."""
+    """centers and clusterPoints of objsToSegment [rows, columns]; then, if asked again, ever finer ones.
+
+    Where everything has moved, as ids in doubt [rows, columns], no cluster holds two ids, and none all of one:
+    what is pushed through its middle once more moves as it did before.
+    """
     pieces = take_apart(to_segment, table, parameters) if parameters.by_piece else [to_segment]
+    if doubtful is not None:
+        pieces = [to_segment & (doubtful == a) for a in np.unique(doubtful[to_segment])]
     divisions = []
     for piece in pieces:
-        whole = parameters.by_piece and concavity(piece, table.cell) <= parameters.concavity
-        least = parameters.least_with_nook if parameters.by_piece else 1
+        halved = doubtful is not None
+        whole = not halved and parameters.by_piece and concavity(piece, table.cell) <= parameters.concavity
+        least = HALVES if halved or parameters.by_piece else 1
         p_WQ = table.points(piece)
         divisions.append(clusterings(p_WQ, parameters.clustering, rng, one_first=whole, least=least))
     current: list[Clustering | None] = [None] * len(pieces)

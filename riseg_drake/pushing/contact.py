@@ -37,6 +37,8 @@ class Contacts:
     """[N], share of what the bar's face moves through that is unsegmented but not of the cluster."""
     unseen: NDArray[np.float64]
     """[N], share of the way to the contact that the camera could not see."""
+    transmitted: NDArray[np.float64]
+    """[N], share of the push that arrives at the target where others push it: gaps take theirs."""
 
 
 def find_contacts(
@@ -46,10 +48,12 @@ def find_contacts(
     table: TableMap,
     pusher: Pusher,
     parameters: ValidityParameters,
+    target: NDArray[np.bool_] | None = None,
 ) -> Contacts:
     """The contacts of pushes through N boundary points [N, 2] along unit directions [N, 2].
 
     Parts of the cluster that the bar's end face passes over at its lowest do not count as contact.
+    `target` is the part of the cluster that is to move, if not all of it [rows, columns].
     """
     lowest_object = pusher.lowest_tip_height / pusher.height_share
     reach = max(pusher.width, parameters.d_push)
@@ -92,4 +96,30 @@ def find_contacts(
         only_target=~met,
         beside_target=table.lookup(strangers & ~table.segmented, stroke).mean(axis=(1, 2)),
         unseen=1.0 - table.lookup(table.seen, gap).mean(axis=(1, 2)),
+        transmitted=np.ones(len(b_W))
+        if target is None
+        else _transmitted(b_W, direction_W, target, table, pusher, parameters.d_push),
     )
+
+
+def _transmitted(
+    b_W: NDArray,
+    direction_W: NDArray,
+    target: NDArray[np.bool_],
+    table: TableMap,
+    pusher: Pusher,
+    d_push: float,
+) -> NDArray[np.float64]:
+    """Share [N] of a push by `d_push`, m, that arrives at a target behind other things.
+
+    Gaps on the way close up first; and the longer the way through others is than the bar is wide, the sooner
+    they turn aside.
+    """
+    farthest = float(np.linalg.norm(table.points(target)[None] - b_W[:, None], axis=2).max())
+    way = b_W[:, None] + np.arange(table.cell / 2, farthest, table.cell)[:, None] * direction_W[:, None]
+    arrived = table.lookup(target, way)  # [N, S]
+    before = np.cumsum(arrived, axis=1) == 0
+    other = table.lookup(table.objects, way)
+    gaps, through = (table.cell * np.count_nonzero(before & which, axis=1) for which in (~other, other))
+    left = np.clip(1.0 - gaps / d_push, 0.0, 1.0) * pusher.width / (pusher.width + through)
+    return np.where(arrived.any(axis=1), left, 0.0)

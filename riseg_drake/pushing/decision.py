@@ -13,9 +13,9 @@ class Ending(Enum):
     """Why a run ends. The first three are Alg. 3's null, the others the loop's."""
 
     NOTHING_LEFT = "nothing_left"
-    """Everything that stands on the table is segmented."""
+    """Everything that stands on the table is segmented, and nothing is in doubt."""
     NOTHING_VALID = "nothing_valid"
-    """Something is left, but no push of it passes every criterion."""
+    """Something is left or in doubt, but no push of it passes every criterion."""
     NO_PATH = "no_path"
     """There are valid pushes, but the arm can do none of them."""
     ENOUGH_INTERACTIONS = "enough_interactions"
@@ -36,7 +36,7 @@ class Criterion(Enum):
     HIGH_ENOUGH = "the bar would have to come too close to the table"
     ONLY_TARGET = "the bar would meet other things, too"
     STAYS_IN_WORK_AREA = "the cluster would be driven out of the work area"
-    NOT_IN_VAIN = "the same push was made before and brought nothing"
+    NOT_IN_VAIN = "too little is to be expected of it, or it was tried before"
 
 
 class PathStage(Enum):
@@ -59,6 +59,8 @@ class Decision(Immutable):
     """Why there is no push; None where there is one, and before the first frame."""
     unsettled_area: float = float("nan")
     """objsToSegment, what is yet to be segmented, m^2 on the table; NaN before the first frame."""
+    doubtful_area: float = 0.0
+    """The part of it, m^2, that has moved, and may be one object or two."""
     candidates: int = 0
     """Without a valid push: the candidates there were; without a path: the valid pushes that were tried."""
     failed: Mapping[Criterion | PathStage, int] = field(default_factory=dict)
@@ -76,7 +78,10 @@ class Decision(Immutable):
             return ""
         if self.ending is Ending.NOTHING_LEFT:
             return "nothing is left to find"
-        area = f"{1e4 * self.unsettled_area:.0f} cm^2 are left to find"
+        unmoved = 1e4 * (self.unsettled_area - self.doubtful_area)
+        areas = [f"{unmoved:.0f} cm^2 are left to find"] if unmoved > 0 or not self.doubtful_area else []
+        areas += [f"{1e4 * self.doubtful_area:.0f} cm^2 are in doubt"] if self.doubtful_area else []
+        area = ", ".join(areas)
         if self.ending is Ending.NOTHING_VALID:
             what = f"no push is valid, {area}"
         elif self.ending is Ending.NO_PATH:

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,13 +12,13 @@ from riseg_drake.pushing.boundary import BoundaryParameters, boundary
 from riseg_drake.pushing.clusters import Cluster, ClustersParameters, find_clusters
 from riseg_drake.pushing.contact import find_contacts
 from riseg_drake.pushing.decision import Criterion, Decision, Ending, PathStage
-from riseg_drake.pushing.objects_to_segment import ObjectsToSegmentParameters, objects_to_segment
+from riseg_drake.pushing.gain import GainParameters, expected_gain
+from riseg_drake.pushing.objects_to_segment import ObjectsToSegmentParameters, things_to_push
 from riseg_drake.pushing.push import NO_PUSH, Push
 from riseg_drake.pushing.push_path import PushPath
 from riseg_drake.pushing.pusher import Pusher
-from riseg_drake.pushing.ranking import RankingParameters, cost_of_pushes
 from riseg_drake.pushing.table_map import TableMap, TableMapParameters
-from riseg_drake.pushing.tried_pushes import TriedPush
+from riseg_drake.pushing.tried_pushes import TriedPush, times_pushed
 from riseg_drake.pushing.validity import ValidityParameters, is_valid_push
 
 ALIKE_DISTANCE = 0.010
@@ -39,7 +40,7 @@ class FindActionParameters:
     boundary: BoundaryParameters = field(default_factory=BoundaryParameters)
     validity: ValidityParameters = field(default_factory=ValidityParameters)
     pusher: Pusher = field(default_factory=Pusher)
-    ranking: RankingParameters = field(default_factory=RankingParameters)
+    gain: GainParameters = field(default_factory=GainParameters)
     paths: int = 30
     """The arm's path is planned for at most this many candidates, the best that are not alike."""
 
@@ -65,35 +66,31 @@ def find_action(
             as reachable and comes without a path.
     """
     parameters = parameters or FindActionParameters()
-    to_segment = objects_to_segment(table, parameters.to_segment)  # line 3
-    area = float(np.count_nonzero(to_segment)) * table.cell_area
+    unmoved, doubtful = things_to_push(table, parameters.to_segment)  # line 3
+    doubtful_area = float(np.count_nonzero(doubtful)) * table.cell_area
+    area = float(np.count_nonzero(unmoved)) * table.cell_area + doubtful_area
     if not area:  # line 4
         return Decision(ending=Ending.NOTHING_LEFT, unsettled_area=0.0)  # line 5
     search = _PathSearch(plan_path, parameters.paths)
-    rounds = find_clusters(to_segment, table, parameters.clusters, rng)  # line 6
-    divisions = []
-    for clusters in rounds:
-        divisions.append(clusters)
-        pushes, failed = valid_pushes(clusters, table, tried, heading_W, parameters)
-        push = search.best(pushes)
-        if push is not None:
-            return Decision(push, unsettled_area=area)  # lines 11, 12
-    if parameters.validity.l_act_last > parameters.validity.l_act:
-        validity = replace(parameters.validity, l_act=parameters.validity.l_act_last)
-        parameters = replace(parameters, validity=validity)
-    # Once more, with the last l_act, and to count what it is that fails.
-    candidates, fails = 0, Counter[Criterion | PathStage]()
-    for clusters in divisions:
-        pushes, failed = valid_pushes(clusters, table, tried, heading_W, parameters)
-        push = search.best(pushes)
-        if push is not None:
-            return Decision(push, unsettled_area=area)
-        for criterion, which in failed.items():
-            fails[criterion] += int(np.count_nonzero(which))
-        candidates += len(failed[Criterion.ACCESSIBLE])
+    fails: Counter[Criterion | PathStage] = Counter()
+    candidates = 0
+    # What has never moved comes before what is in doubt; alone before with others.
+    known = replace(table, segmented=table.segmented | (doubtful > 0), doubtful=None)
+    stages = ((unmoved, known, True), (unmoved, known, False), (doubtful > 0, table, True))
+    for to_segment, scene, alone in stages:
+        if not to_segment.any() or not (alone or parameters.validity.with_others):
+            continue
+        for clusters in find_clusters(to_segment, scene, parameters.clusters, rng, scene.doubtful):  # line 6
+            pushes, failed = valid_pushes(clusters, scene, tried, heading_W, parameters, alone=alone)
+            push = search.best(pushes)
+            if push is not None:
+                return Decision(push, unsettled_area=area, doubtful_area=doubtful_area)  # lines 11, 12
+            for criterion, which in failed.items():
+                fails[criterion] += int(np.count_nonzero(which))
+            candidates += len(failed[Criterion.ACCESSIBLE])
     if search.failed:  # line 17
-        return Decision(NO_PUSH, Ending.NO_PATH, area, search.failed.total(), search.failed)
-    return Decision(NO_PUSH, Ending.NOTHING_VALID, area, candidates, +fails)
+        return Decision(NO_PUSH, Ending.NO_PATH, area, doubtful_area, search.failed.total(), search.failed)
+    return Decision(NO_PUSH, Ending.NOTHING_VALID, area, doubtful_area, candidates, +fails)
 
 
 class _PathSearch:
@@ -137,20 +134,23 @@ def valid_pushes(
     tried: Sequence[TriedPush],
     heading_W: NDArray | None,
     parameters: FindActionParameters,
+    *,
+    alone: bool = True,
 ) -> tuple[list[Push], dict[Criterion, NDArray[np.bool_]]]:
     """The valid pushes of all clusters, best first (lines 7 to 10), and which candidates [N] fail what.
 
-    `heading_W` is the direction [2] in which the pusher points now; None: all are alike.
+    `heading_W` is the direction [2] in which the pusher points now; None: all are alike. Not `alone`, a
+    cluster is pushed with all that it touches.
     """
-    largest = max(int(cluster.cells.sum()) for cluster in clusters)
     pushes: list[Push] = []
     failed: dict[Criterion, list[NDArray]] = {criterion: [] for criterion in Criterion}
     for cluster in clusters:  # line 8
-        B = boundary(cluster.cells, cluster.center_W, table, parameters.boundary)  # line 7
+        pushed = cluster.cells if alone else touching(cluster.cells, table)
+        B = boundary(pushed, cluster.center_W, table, parameters.boundary)  # line 7
         if not len(B):
             continue
         valid, fails = valid_pushes_of(  # lines 9, 10
-            B, cluster, table, largest, tried, heading_W, parameters
+            B, cluster, pushed, table, tried, heading_W, parameters, alone=alone
         )
         pushes += valid
         for criterion, which in fails.items():
@@ -163,36 +163,42 @@ def valid_pushes(
 def valid_pushes_of(
     boundary_W: NDArray,
     cluster: Cluster,
+    pushed: NDArray[np.bool_],
     table: TableMap,
-    largest_cluster: int,
     tried: Sequence[TriedPush],
     heading_W: NDArray | None,
     parameters: FindActionParameters,
+    *,
+    alone: bool,
 ) -> tuple[list[Push], dict[Criterion, NDArray[np.bool_]]]:
     """The valid pushes from boundary points [N, 2], N >= 1, towards the center of their cluster, and which
     candidates [N] fail what.
 
-    Beyond the paper's IsValidPush: the bar touches the cluster before anything else, low enough but not
-    too close to the table, and nothing is driven out of the work area.
+    Beyond the paper's IsValidPush: the bar touches what is to be `pushed` [rows, columns] before anything
+    else, low enough but not too close to the table, and nothing is driven out of the work area. Not `alone`,
+    that is more than the cluster, which then need not move alone.
     """
     validity, pusher = parameters.validity, parameters.pusher
     center_W, P = cluster.center_W, cluster.cells
     direction_W = center_W - boundary_W
     direction_W /= np.linalg.norm(direction_W, axis=1, keepdims=True)
-    contacts = find_contacts(boundary_W, direction_W, P, table, pusher, validity)
+    contacts = find_contacts(
+        boundary_W, direction_W, pushed, table, pusher, validity, target=None if alone else P
+    )
     is_valid = is_valid_push(contacts.b_W, direction_W, center_W, P, table, pusher, validity)
-    cost = cost_of_pushes(
-        contacts, direction_W, is_valid.overlap, P, table, largest_cluster, tried, heading_W,
-        validity, parameters.ranking,
+    thing = P if table.doubtful is None else table.doubtful == table.doubtful[P][0]
+    gain = expected_gain(
+        contacts, direction_W, is_valid.overlap, P, table,
+        tried, times_pushed(thing, table, tried, validity.d_push), heading_W, validity, parameters.gain,
     )  # fmt: skip
     passed = {
         Criterion.CENTER_ON_OBJECT: is_valid.center_on_object,
         Criterion.ACCESSIBLE: is_valid.accessible,
-        Criterion.MOVES_ALONE: is_valid.moves_alone,
+        Criterion.MOVES_ALONE: is_valid.moves_alone | (not alone),
         Criterion.HIGH_ENOUGH: contacts.high_enough,
-        Criterion.ONLY_TARGET: contacts.only_target,
+        Criterion.ONLY_TARGET: contacts.only_target & (contacts.transmitted > 0),
         Criterion.STAYS_IN_WORK_AREA: stays_in_work_area(direction_W, P, table, validity.d_push),
-        Criterion.NOT_IN_VAIN: np.isfinite(cost),
+        Criterion.NOT_IN_VAIN: gain > (0.0 if table.doubtful is None else parameters.gain.least),
     }
     tallest = float(table.height.max())
     cluster_W = table.points(P)
@@ -213,10 +219,16 @@ def valid_pushes_of(
                 center_W=center_W,
                 cluster_W=cluster_W,
                 tallest=tallest,
-                cost=float(cost[n]),
+                cost=float(1.0 - gain[n]),
             )
         )
     return pushes, {criterion: ~passes for criterion, passes in passed.items()}
+
+
+def touching(cluster: NDArray[np.bool_], table: TableMap) -> NDArray[np.bool_]:
+    """Everything on the table that hangs together with a cluster, as cells [rows, columns]."""
+    _, piece = cv2.connectedComponents(table.objects.astype(np.uint8), connectivity=8)
+    return np.isin(piece, np.unique(piece[cluster]))
 
 
 def stays_in_work_area(

@@ -1,6 +1,6 @@
 """Alg. 3, lines 3 to 5: what stands on the table and has no object id yet."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -19,6 +19,20 @@ class ObjectsToSegmentParameters:
     rim: float = 0.006
     """Unsegmented cells this close to a segmented object, m, may be its outline: they do not count
     towards the minimum area."""
+
+
+def things_to_push(
+    table: TableMap, parameters: ObjectsToSegmentParameters | None = None
+) -> tuple[NDArray[np.bool_], NDArray[np.int_]]:
+    """objsToSegment [rows, columns] in two: what has never moved, and the ids of what has and is in doubt.
+
+    Slivers and specks are in neither, and slivers of what is in doubt do not count as things that never moved.
+    """
+    parameters = parameters or ObjectsToSegmentParameters()
+    doubtful = np.zeros(table.objects.shape, int) if table.doubtful is None else table.doubtful
+    unmoved = objects_to_segment(replace(table, segmented=table.segmented | (doubtful > 0)), parameters)
+    large = np.bincount(doubtful[doubtful > 0], minlength=1) * table.cell_area >= parameters.minimum_area
+    return unmoved, np.where((doubtful > 0) & large[doubtful], doubtful, 0)
 
 
 def objects_to_segment(

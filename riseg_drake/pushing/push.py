@@ -51,7 +51,7 @@ class Push(Immutable):
     tallest: float
     """Height of the tallest object on the table, m: the pusher crosses above it."""
     cost: float
-    """What the ranking says, less is better."""
+    """What is lost of one object: less the more objects the push can be expected to settle."""
     path: "PushPath | None" = field(default=None, repr=False)
     """The arm's way there and back; None until it has been planned."""
 

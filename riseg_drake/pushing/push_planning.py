@@ -35,6 +35,7 @@ def plan_push(
     rng: np.random.Generator,
     tried: Sequence[TriedPush] = (),
     parameters: PushPlanningParameters | None = None,
+    found: NDArray | None = None,
 ) -> Decision:
     """The next push, with a path from the posture q_observe [7] and back, or why there is none.
 
@@ -43,12 +44,14 @@ def plan_push(
         objects: [H, W], GetObjsAboveTable of the frame.
         height: [H, W], height above the table, m.
         plane_W: [4], the table top.
-        mask: [H, W], L_t.
+        mask: [H, W], L_t without the objects in doubt.
         q_observe: [7], where the arm is and returns to, rad.
         kinematics: of the arm.
         rng: for the clustering.
         tried: pushes made so far.
         parameters: the defaults if None.
+        found: [H, W], L_t with them: they are pushed after what has never moved. None: nobody tells
+            them from it.
     """
     parameters = parameters or PushPlanningParameters()
     table = map_table(
@@ -61,6 +64,7 @@ def plan_push(
         plane_W,
         robot=frame.robot,
         parameters=parameters.action.table,
+        found=found,
     )
     ahead_W = kinematics.X_WE(q_observe)[:2, 0]
 

@@ -7,7 +7,9 @@ and j along W's x; points on the table are p_WQ = (x, y) in metres.
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,6 +48,19 @@ class TableMap:
     """(x_min, x_max, y_min, y_max), m."""
     plane_W: NDArray[np.float64] = field(default_factory=lambda: np.array([0.0, 0.0, 1.0, 0.0]))
     """The table top, [n, d] with n . p_WQ + d the height of Q above it."""
+    doubtful: NDArray[np.int_] | None = None
+    """[rows, columns], the id of objects that have moved and are not segmented for sure, 0 elsewhere; None
+    where nobody tells them from what has never moved."""
+
+    @cached_property
+    def to_object(self) -> NDArray[np.float32]:
+        """[rows, columns], how far the nearest object is, m."""
+        return self.cell * cv2.distanceTransform((~self.objects).astype(np.uint8), cv2.DIST_L2, 5)
+
+    @cached_property
+    def beside_free(self) -> NDArray[np.bool_]:
+        """[rows, columns], cells that border on one without an object, or are one."""
+        return cv2.dilate((~self.objects).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
 
     @property
     def cell_area(self) -> float:
@@ -54,7 +69,8 @@ class TableMap:
 
     def points(self, mask: NDArray[np.bool_]) -> NDArray[np.float64]:
         """p_WQ [N, 2] of the centres of the cells in a mask, row by row."""
-        i, j = np.nonzero(mask)
+        # Three times as fast as np.nonzero, and asked for some hundred times a decision.
+        i, j = np.divmod(np.flatnonzero(mask), mask.shape[1])
         return self.origin_W + self.cell * np.column_stack([j, i])
 
     def lookup(self, values: NDArray, p_WQ: NDArray) -> NDArray:
@@ -92,6 +108,7 @@ def map_table(
     plane_W: NDArray,
     robot: NDArray[np.bool_] | None = None,
     parameters: TableMapParameters | None = None,
+    found: NDArray | None = None,
 ) -> TableMap:
     """The map of what one image shows.
 
@@ -101,10 +118,11 @@ def map_table(
         X_WC: [4, 4], pose of the camera.
         objects: [H, W], pixels above the table (objMask in the image).
         height: [H, W], height of each pixel's point above the table, m.
-        mask: [H, W], L_t, the object id of each pixel, 0 = none yet.
+        mask: [H, W], L_t, the object id of each pixel, 0 = none yet, or none for sure.
         plane_W: [4], the table top.
         robot: [H, W], pixels to leave out because the robot covers them.
         parameters: the defaults if None.
+        found: [H, W], L_t with the objects in doubt; None where nobody tells.
     """
     parameters = parameters or TableMapParameters()
     valid = depth > 0 if robot is None else (depth > 0) & ~robot
@@ -141,6 +159,9 @@ def map_table(
     segmented = np.zeros(rows * columns, bool)
     segmented[cells] = binarize_mask(mask).reshape(-1)[pixels]
     shape = (rows, columns)
+    doubtful = np.zeros(rows * columns, int)
+    if found is not None:
+        doubtful[cells] = np.where(binarize_mask(mask), 0, found).reshape(-1)[pixels]
     return TableMap(
         origin_W=origin_W,
         cell=cell,
@@ -150,4 +171,5 @@ def map_table(
         seen=seen.reshape(shape),
         work_area_W=(x_min, x_max, y_min, y_max),
         plane_W=np.asarray(plane_W, float),
+        doubtful=None if found is None else doubtful.reshape(shape),
     )

@@ -1,11 +1,16 @@
 """What earlier pushes brought, so that none is repeated in vain."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.pushing.table_map import TableMap
+
+TOUCHED = 0.010
+"""What lies within this distance, m, of where a push ended was pushed by it."""
 
 
 @dataclass(frozen=True)
@@ -18,6 +23,31 @@ class TriedPush:
     """[2], its direction."""
     changed: bool
     """Whether the number of segmented objects or their area changed."""
+
+
+def times_pushed(thing: NDArray[np.bool_], table: TableMap, tried: Sequence[TriedPush], d_push: float) -> int:
+    """How many of the pushes made so far ended at a thing, as cells [rows, columns].
+
+    What was pushed by `d_push`, m, lies where the bar's face stopped.
+    """
+    P = table.points(thing)
+    ends = [push.p_WB[:2] + d_push * push.direction_W for push in tried]
+    return sum(bool((np.linalg.norm(P - end, axis=1) <= TOUCHED).any()) for end in ends)
+
+
+def novelty(
+    b_W: NDArray, direction_W: NDArray, tried: Sequence[TriedPush], distance: float
+) -> NDArray[np.float64]:
+    """How unlike each of T earlier pushes are candidates with contacts [N, 2], m, and directions [N, 2].
+
+    [N, T], from 0 for the same push to 1 for one from the other side, or from further than about twice
+    `distance`, m, away.
+    """
+    made_W = np.array([push.p_WB[:2] for push in tried]).reshape(-1, 2)
+    ahead_W = np.array([push.direction_W for push in tried]).reshape(-1, 2)
+    apart = np.linalg.norm(b_W[:, None] - made_W, axis=2)
+    alike = (1.0 + direction_W @ ahead_W.T) / 2
+    return 1.0 - alike * np.exp(-0.5 * (apart / distance) ** 2)
 
 
 @dataclass(frozen=True)

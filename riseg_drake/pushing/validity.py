@@ -21,9 +21,9 @@ class ValidityParameters:
     """How far an object is pushed, m (paper: 2 cm)."""
     l_act: float = 0.3
     """Largest share of the moved cluster that may come to lie on other objects (paper: 0.3)."""
-    l_act_last: float = 0.7
-    """Where nothing is valid by l_act, this one is tried before giving up (l_act: never). A wedged-in
-    object then moves its neighbours, too, which by then mostly are known."""
+    with_others: bool = True
+    """Where nothing can be pushed alone, push it with what it touches, or by way of it (the paper: never). A
+    wedged-in object then moves its neighbours, too, which by then mostly are known."""
     clearance: float = 0.010
     """Distance of the pusher's face from the contact where it is lowered, m: the paper's "short
     distance from b"."""

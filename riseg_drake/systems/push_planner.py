@@ -19,9 +19,11 @@ class PushPlanner(LeafSystem):
         pair: FramePair; the push is planned in its current frame.
         above_table: an object with `mask` bool [H, W], `height` float32 [H, W] in m and `plane_W` [4],
             of the current frame (GetObjsAboveTable).
-        mask: L_t of the current frame, [H, W].
+        mask: L_t of the current frame without the objects in doubt, [H, W].
         position: the arm's commanded joint angles [7], rad; where the path begins and ends.
         tried_pushes: tuple of TriedPush; may be left unconnected.
+        found: L_t with the objects in doubt, [H, W]; may be left unconnected: what is in doubt is then pushed
+            as if it had never moved.
 
     Outputs:
         decision: Decision, a Push with its path or the reason why there is none; UNDECIDED where no frame
@@ -49,6 +51,7 @@ class PushPlanner(LeafSystem):
         self._mask = self.DeclareAbstractInputPort("mask", AbstractValue.Make(NO_MASK))
         self._position = self.DeclareVectorInputPort("position", 7)
         self._tried = self.DeclareAbstractInputPort("tried_pushes", AbstractValue.Make(()))
+        self._found = self.DeclareAbstractInputPort("found", AbstractValue.Make(NO_MASK))
         self.DeclareAbstractOutputPort(
             "decision",
             alloc=AbstractValue.Make(UNDECIDED).Clone,
@@ -75,5 +78,6 @@ class PushPlanner(LeafSystem):
             np.random.default_rng([self._seed, frame.sequence]),
             self._tried.Eval(context) if self._tried.HasValue(context) else (),
             self._parameters,
+            self._found.Eval(context) if self._found.HasValue(context) else None,
         )
         output.set_value(decision)

@@ -22,22 +22,24 @@ class DrawnTable:
     objects: np.ndarray = field(default_factory=lambda: np.zeros(SHAPE, bool))
     segmented: np.ndarray = field(default_factory=lambda: np.zeros(SHAPE, bool))
     height: np.ndarray = field(default_factory=lambda: np.zeros(SHAPE, np.float32))
+    doubtful: np.ndarray = field(default_factory=lambda: np.zeros(SHAPE, int))
     work_area: tuple = (0.25, 0.75, -0.28, 0.28)
 
-    def box(self, x, y, width, depth, yaw=0.0, height=0.05, segmented=False):
+    def box(self, x, y, width, depth, yaw=0.0, height=0.05, segmented=False, doubtful=0):
         offset = self.centres() - [x, y]
         c, s = np.cos(yaw), np.sin(yaw)
         local = offset @ np.array([[c, -s], [s, c]])
-        return self.put((np.abs(local) <= [width / 2, depth / 2]).all(-1), height, segmented)
+        return self.put((np.abs(local) <= [width / 2, depth / 2]).all(-1), height, segmented, doubtful)
 
-    def disc(self, x, y, radius, hole=0.0, height=0.05, segmented=False):
+    def disc(self, x, y, radius, hole=0.0, height=0.05, segmented=False, doubtful=0):
         distance = np.linalg.norm(self.centres() - [x, y], axis=-1)
-        return self.put((distance <= radius) & (distance >= hole), height, segmented)
+        return self.put((distance <= radius) & (distance >= hole), height, segmented, doubtful)
 
-    def put(self, cells, height, segmented):
+    def put(self, cells, height, segmented, doubtful=0):
         self.objects[cells] = True
         self.height[cells] = height
         self.segmented[cells] = segmented
+        self.doubtful[cells] = doubtful
         return self
 
     @staticmethod
@@ -47,7 +49,14 @@ class DrawnTable:
 
     def map(self):
         return TableMap(
-            ORIGIN, CELL, self.objects, self.segmented, self.height, np.ones(SHAPE, bool), self.work_area
+            ORIGIN,
+            CELL,
+            self.objects,
+            self.segmented,
+            self.height,
+            np.ones(SHAPE, bool),
+            self.work_area,
+            doubtful=self.doubtful,
         )
 
 

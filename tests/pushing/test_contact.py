@@ -52,3 +52,27 @@ def test_bar_may_meet_only_what_it_is_to_push(drawn, x, segmented, clear):
     drawn.box(x, 0.012, 0.006, 0.006, segmented=segmented)
     contact = contact_of(drawn, cluster, [0.5, 0.0])
     assert bool(contact.only_target[0]) is clear
+
+
+def pushed_through(drawn, gap, through):
+    """What arrives at a box of 4 cm of a push by way of another one, `through` deep and `gap` before it."""
+    drawn.box(0.52, 0.0, 0.04, 0.04)
+    target = drawn.objects.copy()
+    edge = 0.5 - gap
+    table = drawn.box(edge - through / 2, 0.0, through, 0.04).map()
+    boundary_W = np.array([[edge - through, 0.0]])
+    contacts = find_contacts(
+        boundary_W, ALONG_X, table.objects, table, Pusher(), ValidityParameters(), target=target
+    )
+    assert contacts.b_W[0] == pytest.approx(boundary_W[0], abs=0.003)
+    return contacts.transmitted[0]
+
+
+@pytest.mark.parametrize(("gap", "through", "share"), [(0, 0.03, 0.5), (0.01, 0.03, 0.25), (0.02, 0.03, 0)])
+def test_gaps_and_things_between_take_their_share_of_a_push(drawn, gap, through, share):
+    assert pushed_through(drawn, gap, through) == pytest.approx(share, abs=0.06)
+
+
+def test_all_of_a_push_arrives_at_what_is_touched(drawn):
+    drawn.box(0.52, 0.0, 0.04, 0.04)
+    assert contact_of(drawn, drawn.objects.copy(), [0.5, 0.0]).transmitted[0] == 1.0

@@ -111,7 +111,7 @@ def test_wedged_in_object_is_pushed_after_all_unless_the_paper_is_taken_literall
     drawn.box(0.465, 0.01, 0.02, 0.06, segmented=True)
     table = drawn.box(0.53, 0.03, 0.02, 0.02, segmented=True).map()
     literal = FindActionParameters()
-    literal.validity.l_act_last = literal.validity.l_act
+    literal.validity.with_others = False
     assert act(table, parameters=literal) is None
     assert act(table) is not None
 
@@ -192,3 +192,60 @@ def test_each_clustering_method_leads_to_a_push(drawn, method):
     parameters = FindActionParameters()
     parameters.clusters.clustering.method = method
     assert act(cluttered(drawn).map(), parameters=parameters) is not None
+
+
+def test_what_has_never_moved_is_pushed_before_what_is_in_doubt_however_small_it_is(drawn):
+    drawn.box(0.5, 0.1, 0.08, 0.06, doubtful=3).box(0.5, -0.1, 0.02, 0.03)
+    decision = decide(drawn.map())
+    assert decision.push.center_W == pytest.approx([0.5, -0.1], abs=0.003)
+    assert decision.doubtful_area == pytest.approx(0.08 * 0.06, rel=0.1)
+    assert decision.unsettled_area == pytest.approx(0.08 * 0.06 + 0.02 * 0.03, rel=0.1)
+
+
+def test_what_is_in_doubt_is_pushed_beside_its_middle_so_that_two_would_move_differently(drawn):
+    push = act(drawn.box(0.5, 0.0, 0.1, 0.05, doubtful=3).map())
+    arm = np.linalg.det([push.direction_W, np.array([0.5, 0.0]) - push.p_WB[:2]])
+    assert abs(arm) > 0.015  # m from the middle to the line of the push
+    whole = act(drawn.box(0.5, 0.0, 0.1, 0.05).map())
+    assert whole.center_W == pytest.approx([0.5, 0.0], abs=0.003)
+
+
+def test_what_two_pushes_have_left_in_doubt_is_not_pushed_again_and_the_ending_says_so(drawn):
+    table = drawn.box(0.5, 0.0, 0.06, 0.05, doubtful=3).map()
+    # Each ended where the thing is now.
+    sides = [(np.array([1.0, 0.0]), [0.45, 0.0, 0.02]), (np.array([0.0, 1.0]), [0.5, -0.045, 0.02])]
+    tried = [TriedPush(np.array(p_WB), ahead_W, changed=True) for ahead_W, p_WB in sides]
+    assert act(table, tried=tried[:1]) is not None
+    decision = decide(table, tried=tried)
+    assert decision.ending is Ending.NOTHING_VALID
+    assert decision.failed[Criterion.NOT_IN_VAIN] == decision.candidates
+    assert decision.why.startswith("no push is valid, 30 cm^2 are in doubt: too little is to be expected")
+
+
+def test_a_rim_of_what_is_in_doubt_is_no_thing_that_never_moved(drawn):
+    drawn.box(0.5, 0.0, 0.062, 0.062).box(0.5, 0.0, 0.054, 0.054, doubtful=3)
+    decision = decide(drawn.map())
+    assert decision.unsettled_area == decision.doubtful_area
+
+
+def test_a_thing_behind_known_ones_is_pushed_by_way_of_them(drawn):
+    drawn.box(0.5, 0.0, 0.12, 0.12, segmented=True).box(0.5, 0.0, 0.04, 0.04)
+    push = act(drawn.map())
+    assert push.center_W == pytest.approx([0.5, 0.0], abs=0.003)
+    assert np.abs(push.p_WB[:2] - [0.5, 0.0]).max() == pytest.approx(0.06, abs=0.003)
+
+
+def test_alone_comes_before_with_others(drawn):
+    drawn.box(0.45, 0.1, 0.12, 0.12, segmented=True).box(0.45, 0.1, 0.06, 0.06)
+    push = act(drawn.box(0.6, -0.1, 0.02, 0.025).map())
+    assert push.center_W == pytest.approx([0.6, -0.1], abs=0.003)
+
+
+def test_what_is_in_doubt_is_left_alone_where_a_push_would_stir_more_than_it_settles(drawn):
+    drawn.box(0.5, 0.0, 0.03, 0.03, doubtful=3)
+    # Open on one side, towards which nothing can be pushed.
+    for x, y in ((0.47, 0.0), (0.53, 0.0), (0.5, 0.03)):
+        drawn.box(x, y, 0.028, 0.03, segmented=True)
+    decision = decide(drawn.map())
+    assert decision.ending is Ending.NOTHING_VALID
+    assert decision.failed[Criterion.NOT_IN_VAIN] > decision.candidates / 2

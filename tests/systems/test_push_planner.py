@@ -60,7 +60,7 @@ def seen_from(panda, q_observe):
     return FramePair(frame, frame), above
 
 
-def evaluate(panda, q_observe, pair, above, mask, tried=None, seed=0):
+def evaluate(panda, q_observe, pair, above, mask, tried=None, seed=0, found=None):
     planner = PushPlanner(panda, seed=seed)
     context = planner.CreateDefaultContext()
     planner.GetInputPort("pair").FixValue(context, Value[object](pair))
@@ -69,6 +69,8 @@ def evaluate(panda, q_observe, pair, above, mask, tried=None, seed=0):
     planner.GetInputPort("position").FixValue(context, q_observe)
     if tried is not None:
         planner.GetInputPort("tried_pushes").FixValue(context, Value[object](tried))
+    if found is not None:
+        planner.GetInputPort("found").FixValue(context, Value[object](found))
     return planner.GetOutputPort("decision").Eval(context)
 
 
@@ -112,6 +114,15 @@ def test_segmented_scene_gives_null(panda, q_observe, scene):
     assert decision.ending is Ending.NOTHING_LEFT
 
 
+def test_what_is_found_and_not_settled_is_in_doubt_and_pushed_beside_its_middle(panda, q_observe, scene):
+    decision = evaluate(panda, q_observe, *scene, NOTHING, found=3 * scene[1].mask.astype(np.uint16))
+    assert decision.doubtful_area == decision.unsettled_area == pytest.approx(np.pi * 0.03**2, rel=0.08)
+    assert np.linalg.norm(decision.push.center_W - [0.5, 0.05]) > 0.01
+    unknown = evaluate(panda, q_observe, *scene, NOTHING, found=NOTHING)
+    assert unknown.doubtful_area == 0.0
+    assert unknown.push.center_W == pytest.approx([0.5, 0.05], abs=0.002)
+
+
 def test_before_the_first_frame_nothing_is_decided(panda, q_observe, scene):
     assert evaluate(panda, q_observe, NO_PAIR, scene[1], NOTHING) is UNDECIDED
 
@@ -131,5 +142,5 @@ def test_push_tried_in_vain_is_not_proposed_again(panda, q_observe, scene):
 def test_ports_have_the_names_of_the_contract(panda):
     planner = PushPlanner(panda)
     names = [planner.get_input_port(i).get_name() for i in range(planner.num_input_ports())]
-    assert names == ["pair", "above_table", "mask", "position", "tried_pushes"]
+    assert names == ["pair", "above_table", "mask", "position", "tried_pushes", "found"]
     assert planner.get_output_port().get_name() == "decision"
