@@ -18,7 +18,10 @@ from riseg_drake.segmentation.partition import (
     partition,
     with_ids,
 )
-from riseg_drake.segmentation.propagation import UNKNOWN, carry_labels
+from riseg_drake.segmentation.propagation import UNKNOWN, carry_labels, draw_labels
+
+_BLIND = 0.004
+"""Share of a picture that has no depth, and is not the robot, from which that matters."""
 
 
 @dataclass
@@ -124,7 +127,13 @@ def carry_bodies(
     ids = np.concatenate([[0], np.where(rigid[0] > 0, rigid[0], UNKNOWN), hidden]).astype(np.uint16)
     moves = {i + 1: bodies.motions_K[g] for i, g in enumerate(rigid[1]) if g > 0}
     carried = _carry(belief, label + 1, moves, frame, above, number)
-    return np.where(carried == UNKNOWN, UNKNOWN, ids[np.where(carried == UNKNOWN, 0, carried)])
+    found = np.where(carried == UNKNOWN, UNKNOWN, ids[np.where(carried == UNKNOWN, 0, carried)])
+    blind = (frame.depth == 0) & ~frame.robot & ~above.mask
+    if np.count_nonzero(blind) < _BLIND * frame.depth.size:
+        return found
+    # Too near for the camera to measure: the depth that the keyframe has, moved, must do.
+    image = belief.keyframe.image_of((label + 1).astype(np.uint16))
+    return np.where(blind, ids[draw_labels(belief.keyframe.frame, frame, image, moves)], found)
 
 
 def next_belief(

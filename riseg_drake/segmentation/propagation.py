@@ -12,9 +12,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import Intrinsics, bounding_region, project
+from riseg_drake.geometry.camera import Intrinsics, bounding_region, project, rays
 from riseg_drake.geometry.rgbd import Frame, FramePair
-from riseg_drake.geometry.se3 import inverse
+from riseg_drake.geometry.se3 import inverse, move_points
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.surface import SurfacePixels, seek, surface_pixels
 
@@ -70,6 +70,38 @@ def carry_labels(
     out = np.zeros(above_1.mask.shape, np.uint16)
     out[v, u] = np.where(label > 0, label, remembered)
     return nearest_label(out, above_1.mask, _REACH * above_1.pixels_per_metre(current.intrinsics))
+
+
+def draw_labels(
+    reference: Frame,
+    current: Frame,
+    label_0: NDArray[np.uint16],
+    motion_of: Mapping[int, NDArray[np.float64]],
+) -> NDArray[np.uint16]:
+    """The labels [H, W] of the reference frame drawn into the current one by the depth of the former.
+
+    For pixels where the current frame has no depth to look anything up by. `motion_of`: for the labels that
+    moved, the motion [4, 4] in C0.
+    """
+    drawn = np.zeros_like(label_0)
+    nearest = np.full(label_0.shape, np.inf, np.float32)
+    X_C1C0 = inverse(current.X_WC) @ reference.X_WC
+    v, u = np.nonzero((label_0 > 0) & (reference.depth > 0))
+    p_C0Q = rays(reference.intrinsics)[v, u].astype(float) * reference.depth[v, u][:, None]
+    owner = label_0[v, u]
+    for a in np.unique(owner):
+        p_C1Q = move_points(X_C1C0 @ motion_of.get(int(a), np.eye(4)), p_C0Q[owner == a])
+        (row, column), inside = (x.T for x in pixels_of(p_C1Q, current.intrinsics))
+        row, column, z = row[inside], column[inside], p_C1Q[inside, 2].astype(np.float32)
+        spots = np.zeros(drawn.shape, np.float32)
+        spots[row, column] = 1 / z
+        # Nearer than it was, a thing is larger: its points leave gaps.
+        spots = cv2.morphologyEx(spots, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
+        with np.errstate(divide="ignore"):
+            z_1 = 1 / spots
+        front = (spots > 0) & (z_1 < nearest)
+        drawn[front], nearest[front] = a, z_1[front]
+    return drawn
 
 
 def nearest_label(label: NDArray[np.uint16], inside: NDArray[np.bool_], reach: float) -> NDArray[np.uint16]:
