@@ -1,7 +1,7 @@
 """Alg. 1: the robot acts and segments, and every interaction leaves L*_t behind."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -124,7 +124,7 @@ def interactions(
             made = wired.interaction_step(context)
             progress.end = progress.end or _why(decision, made, wired.most_interactions)
         elif progress.time >= longest:
-            progress.decision = Decision(ending=Ending.TIME, unsettled_area=decision.unsettled_area)
+            progress.decision = replace(decision, push=NO_PUSH, ending=Ending.TIME, candidates=0, failed={})
             progress.end = _and(f"{longest:g} s were {'over' if wall else 'simulated'}", progress.decision.why)
         elif progress.end and wall and book.has_seen:
             yield book.close(wired.interaction_step(context))

@@ -285,4 +285,4 @@ def _enough(decision: Decision) -> Decision:
     """The decision that stands once as many pushes as may be were made."""
     if decision.ending is Ending.NOTHING_LEFT:
         return decision
-    return Decision(ending=Ending.ENOUGH_INTERACTIONS, unsettled_area=decision.unsettled_area)
+    return replace(decision, push=NO_PUSH, ending=Ending.ENOUGH_INTERACTIONS, candidates=0, failed={})
