@@ -1,5 +1,7 @@
 """What is counted between two steps, with a stand-in for the diagram."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from riseg_drake.app.interactions import Truth, _Book
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pushing.push import NO_PUSH
+from riseg_drake.segmentation.segmentation import nothing_segmented
 from riseg_drake.systems.stage_clock import StageClock
 
 SIZE = (8, 40)
@@ -23,6 +26,9 @@ class Scene:
         mask = np.zeros(SIZE, np.uint16)
         mask[:, 5 : 5 + self.found] = 3
         return mask
+
+    def segmentation(self, _):
+        return replace(nothing_segmented(SIZE), label=self.mask(None))
 
     def read(self, _, __):
         return NO_PUSH

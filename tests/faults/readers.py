@@ -112,7 +112,7 @@ def _all_files(place: Path) -> list[Path]:
 def _recording(place: Path) -> None:
     folder = write(place / "recording", drawn_frames(4, CAMERA), CAMERA)
     (folder / "run.json").write_text('{"seed": 3}\n')
-    (folder / "scenario.yaml").write_text("segment:\n  memory: true\nlongest: 30.0\n")
+    (folder / "scenario.yaml").write_text("segment:\n  evidence: {memory: true}\nlongest: 30.0\n")
     (folder / "robot").mkdir()
     for k in range(4):
         cv2.imwrite(str(folder / "robot" / f"00000{k}.png"), np.zeros(CAMERA.shape, np.uint8))

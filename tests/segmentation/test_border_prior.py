@@ -74,15 +74,15 @@ def test_holes_are_a_share_of_the_border():
 def test_every_cue_makes_one_body_less_likely_by_its_weight_and_the_picture_proves_nothing():
     color = np.where(U[..., None] < 20, 0, 255).astype(np.uint8).repeat(3, -1)
     parameters = BorderPriorParameters()
-    # Colour saturates at 60 gray levels, half the border is without depth.
+    # Colour saturates at 60 gray levels, a quarter of the border is without depth.
     depth = np.ones((40, 40), np.float32)
-    depth[:20] = 0
+    depth[:10] = 0
     both = border_prior(two_halves(FLAT, color, depth), parameters)
-    assert both == pytest.approx([3.0 - 0.045 * 60 - 1.6 * 0.5])
+    assert both == pytest.approx([2.5 - 0.045 * 60 - 1.6 * 0.25])
     step = border_prior(two_halves(np.where(U < 20, 0.03, 0.024), color, depth), parameters)
     assert step == pytest.approx(both - 0.2 * 3)
     deep = two_halves(np.where(np.abs(U - 19.5) < 3, 0.0, 0.03), color, np.zeros((40, 40), np.float32))
-    assert border_prior(deep, parameters) == pytest.approx([-3.0])
+    assert border_prior(deep, parameters) == pytest.approx([-1.5])
 
 
 def test_mirroring_the_picture_changes_nothing():
