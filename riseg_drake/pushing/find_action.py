@@ -76,7 +76,12 @@ def find_action(
     candidates = 0
     # What has never moved comes before what is in doubt; alone before with others.
     known = replace(table, segmented=table.segmented | (doubtful > 0), doubtful=None)
-    stages = ((unmoved, known, True), (unmoved, known, False), (doubtful > 0, table, True))
+    stages = (
+        (unmoved, known, True),
+        (unmoved, known, False),
+        (doubtful > 0, table, True),
+        (doubtful > 0, table, False),
+    )
     for to_segment, scene, alone in stages:
         if not to_segment.any() or not (alone or parameters.validity.with_others):
             continue

@@ -1,8 +1,8 @@
 """What the still picture says of each border: may its two sides be one body? Motion overrules it.
 
 Where one thing ends and another begins there is mostly a step of depth, a dent, or a change of colour: what
-static methods know. How much each is worth is about what a logistic regression says on rendered toys and household
-things with true labels: rims of bowls and prints are borders inside one thing as often as not.
+static methods know. How much each is worth is about what a logistic regression says on rendered toys and
+household things with true labels: rims of bowls and prints are borders inside one thing as often as not.
 """
 
 from dataclasses import dataclass
