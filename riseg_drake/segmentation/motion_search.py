@@ -58,6 +58,10 @@ class MotionSearchParameters:
 
 _RING = np.ones((13, 13), np.uint8)
 """Six pixels around an outline are looked at: what was free there is free where it went."""
+_EDGES_MIN = 25
+"""Pixels with a gradient that it takes to sharpen a motion."""
+_BETTER = 0.3
+"""Mean squared residuals by which a motion must explain a superpixel better for that to be its own."""
 _GROWTH = (1.0, 1.4, 4.0, 50.0)
 """Radii, in those of a patch, within which a motion is sharpened in turn."""
 
@@ -180,19 +184,17 @@ class _Search:
         blank = not np.isfinite(distance).all()
         samples = self._parameters.samples * (3 if blank else 1)
         results = []
-        for start, better_by in product(self._valleys(patch, samples), (0.3, -np.inf)):
+        for start, better_by in product(self._valleys(patch, samples), (_BETTER, -np.inf)):
             motion = start
             for radius in _GROWTH:
                 mine = self._costs(motion).misfit[0]
                 explained = (mine < self._parameters.unexplained + 1) & (mine < best_known - better_by)
                 if radius == _GROWTH[0] or blank:
                     explained |= patch
-                members = explained & (distance < radius * self._parameters.patch)
-                edges = np.flatnonzero(members[self._keyframe.edges.piece])
-                if len(edges) < 25:
+                fitted = self._fitted(motion, explained & (distance < radius * self._parameters.patch))
+                if fitted is None:
                     break
-                fitted, alignment = self._keyframe.edges.subset(edges), self._parameters.alignment
-                motion, _ = self._fit.align(fitted, motion, alignment.rounds, alignment)
+                motion = fitted
             own = self._costs(motion)
             results.append((self._gain(own, costs, part), motion, own))
         # Gains end where noise begins; among those that are alike the patch itself tells.
@@ -212,13 +214,19 @@ class _Search:
     def sharpened(self, motion: NDArray, costs: Costs, part: NDArray[np.intp]) -> tuple[float, NDArray, Costs]:
         """A proposed motion [4, 4], made to fit what it explains: the gain, nats, the motion, and its costs."""
         mine = self._costs(motion).misfit[0]
-        members = (mine < self._parameters.unexplained + 1) & (mine < costs.misfit.min(0) - 0.3)
-        edges = np.flatnonzero(members[self._keyframe.edges.piece])
-        if len(edges) >= 25:
-            alignment = self._parameters.alignment
-            motion, _ = self._fit.align(self._keyframe.edges.subset(edges), motion, alignment.rounds, alignment)
+        better = (mine < self._parameters.unexplained + 1) & (mine < costs.misfit.min(0) - _BETTER)
+        fitted = self._fitted(motion, better)
+        motion = motion if fitted is None else fitted
         own = self._costs(motion)
         return self._gain(own, costs, part), motion, own
+
+    def _fitted(self, motion: NDArray, members: NDArray[np.bool_]) -> NDArray | None:
+        """A motion [4, 4] sharpened on the edges of some superpixels [N]; None where they have too few."""
+        edges = np.flatnonzero(members[self._keyframe.edges.piece])
+        if len(edges) < _EDGES_MIN:
+            return None
+        alignment = self._parameters.alignment
+        return self._fit.align(self._keyframe.edges.subset(edges), motion, alignment.rounds, alignment)[0]
 
     def _gain(self, own: Costs, costs: Costs, part: NDArray[np.intp]) -> float:
         """Nats by which a motion explains a part better, or superpixels wherever they are."""

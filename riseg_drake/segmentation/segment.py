@@ -54,7 +54,7 @@ def segment(
     if before.sequence == pair.current.sequence:
         return before
     if parameters.method == "evidence":
-        return segment_by_evidence(before, pair, groups, above_0, above_1, parameters.evidence, bfif)
+        return segment_by_evidence(before, pair, groups, above_1, parameters.evidence, bfif)
     if parameters.method == "paper":
         return segment_as_in_paper(before, pair, expected_flow, optical_flow, groups, above_0, parameters.paper)
     raise ValueError(f"no method {parameters.method!r} to segment: choose evidence or paper")

@@ -65,7 +65,6 @@ def segment_by_evidence(
     before: Segmentation,
     pair: FramePair,
     groups: BFIFGroups,
-    above_0: AboveTable,
     above_1: AboveTable,
     parameters: EvidenceParameters,
     bfif: BFIFParameters,
@@ -73,17 +72,14 @@ def segment_by_evidence(
     """L_t from G_t and L_t-1.
 
     Args:
-        before: L_t-1; if it already belongs to this pair's frame it is the answer.
+        before: L_t-1.
         pair: the frames of t-1 and t.
         groups: G_t.
-        above_0: objMask at t-1.
         above_1: objMask at t.
         parameters: see there.
         bfif: what the groups were made with: noise of the measurements, and when two motions are one.
     """
     frame = pair.current
-    if before.sequence == frame.sequence:
-        return before
     if before.belief is None:
         return _begin(before, frame, above_1, parameters, bfif)
     now = _with_rest(before, frame, above_1, parameters, bfif)
@@ -109,18 +105,12 @@ def segment_by_evidence(
     )
     depth_noise = max(above_1.depth_noise, belief.keyframe.above.depth_noise)
     if len(candidates_K) and not deciding:
-        seen = observe(
-            belief.keyframe, frame, belief.bond, belief.part, candidates_K, depth_noise, parameters.observation
-        )
-        bodies = bodies_of(belief, seen, bodies, parameters.belief)
+        seen, bodies = _explained(belief, frame, candidates_K, bodies, depth_noise, parameters)
         deciding = _has_gone_far(belief, frame, seen, bodies, parameters)
     if deciding:
         candidates_K = _searched(belief, frame, above_1, candidates_K, depth_noise, parameters)
-    if len(candidates_K) and deciding:
-        seen = observe(
-            belief.keyframe, frame, belief.bond, belief.part, candidates_K, depth_noise, parameters.observation
-        )
-        bodies = bodies_of(belief, seen, bodies, parameters.belief)
+        if len(candidates_K):
+            seen, bodies = _explained(belief, frame, candidates_K, bodies, depth_noise, parameters)
     return _carried(now, pair, above_1, seen, bodies, deciding, parameters, bfif)
 
 
@@ -156,6 +146,21 @@ def _with_rest(
 def _bodies_before(now: Segmentation) -> Bodies:
     assert now.belief is not None
     return now.bodies[max(now.bodies)] if now.bodies else standing(now.belief)
+
+
+def _explained(
+    belief: Belief,
+    frame: Frame,
+    candidates_K: NDArray[np.float64],
+    before: Bodies,
+    depth_noise: float,
+    parameters: EvidenceParameters,
+) -> tuple[Observation, Bodies]:
+    """What a frame says, given some motions [C, 4, 4], and the bodies by it."""
+    seen = observe(
+        belief.keyframe, frame, belief.bond, belief.part, candidates_K, depth_noise, parameters.observation
+    )
+    return seen, bodies_of(belief, seen, before, parameters.belief)
 
 
 def _searched(
