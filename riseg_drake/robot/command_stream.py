@@ -119,6 +119,8 @@ class CommandStream:
         self._contacts: list[tuple[float, float]] = []
         self._standing = 0.0  # s, for which the arm has stood in a pause
         self._status: ArmStatus | None = None
+        self._now = -np.inf  # of the last step
+        self._unheard = np.zeros(7)  # see _note_silence
         self.state = SafetyState()
         self.words = 0
         """How often the operator has said that the arm may move again."""
@@ -195,6 +197,7 @@ class CommandStream:
         `now` and `image_time`, that of the newest picture, are in s by the steady clock of the status.
         """
         before = self.state
+        self._note_silence(now, status)
         target = self._playout.advance(self.period) if before.may_move else None
         seen = self._look(now, status, image_time, target)
         if before.mode is not Mode.WAITING or self.at_rest:  # a word that came while it brakes has to wait
@@ -213,18 +216,36 @@ class CommandStream:
         self._note_where_it_stands(seen)
         return self._fall_silent() if self._has_no_hearer(seen) else self._command()
 
+    def _note_silence(self, now: float, status: ArmStatus | None) -> None:
+        """How far each joint was told to go since the arm was last heard of, rad [7]: it may have gone, or not."""
+        speed = np.zeros(7) if self._limiter is None else np.abs(self._limiter.velocity)
+        is_news = status is not None and (self._status is None or status.time > self._status.time)
+        if is_news and self.state.cause is not Cause.STATUS_OLD:
+            self._unheard = speed * (now - status.time)
+        elif np.isfinite(self._now):
+            self._unheard = self._unheard + speed * (now - self._now)
+        self._now = now
+
     def _note_where_it_stands(self, seen: Observation) -> None:
         """Velocity mode: in a pause the arm is held where it came to rest, which no sum of velocities tells.
 
-        Only while its status goes on: nobody can have moved it by hand, and from there on nobody may.
+        Only once it stands and its status is there: nobody can have moved it by hand while that went on. Where
+        that was late, no further away than what it was told meanwhile explains: of velocities that came late,
+        too, it has followed some and not others.
         """
-        paused = self.state.mode is Mode.PAUSED and self.state.cause is Cause.IMAGES_OLD
-        if self.mode != VELOCITY or not paused or self._limiter is None or not self._limiter.at_rest:
+        stands = self.state.mode is Mode.PAUSED and self._limiter is not None and self._limiter.at_rest
+        if self.mode != VELOCITY or not stands or status_is_old(seen, self._parameters.safety):
             self._standing = 0.0
             return
         self._standing += self.period
-        if self._standing - self.period < STANDING <= self._standing and self._status is not None:
-            self._drift = self._limiter.position - self._status.position
+        if not self._standing - self.period < STANDING <= self._standing:
+            return
+        assert self._limiter is not None
+        assert self._status is not None
+        drift = self._limiter.position - self._status.position
+        unexplained = np.abs(drift - self._drift) - self._unheard
+        if self.state.cause is Cause.IMAGES_OLD or (unexplained <= self._parameters.safety.displacement).all():
+            self._drift = drift
 
     def _set_out(self, before: SafetyState, status: ArmStatus) -> None:
         """Begin to move, or go on after a pause, at the path's nearest point; stay where that is too far."""

@@ -226,6 +226,25 @@ def test_in_velocity_mode_drift_on_the_way_is_no_reason_to_stop_after_a_pause():
     assert np.abs(lab.q - lab.path.value(lab.path.end_time())[:, 0]).max() < 0.002
 
 
+@pytest.mark.parametrize(("missing", "goes_on"), [(0.1, True), (-0.1, True), (0.2, False)])
+def test_in_velocity_mode_a_silence_explains_what_was_commanded_in_it_and_no_more(missing, goes_on):
+    lab = Lab("velocity")
+    lab.go(READY + np.array([0.8, 0, 0, 0, 0, 0, 0]))
+    lab.run(1.2)
+    moved = lab.speeds[-1][0] * missing  # s of it; the silence is noticed after 0.1 s, and then the arm brakes
+    moved += np.copysign(0.0095, missing)
+    lab.delay_status(0.5, 0.02)
+    lab.run(0.4)
+    lab.q = lab.q - np.array([moved, 0, 0, 0, 0, 0, 0])  # by velocities that came too late
+    lab.run(0.6)
+    if not goes_on:
+        assert lab.stream.state == SafetyState(Mode.STOPPED, Cause.MOVED)
+        return
+    assert lab.stream.state.may_move
+    lab.run(6.0)
+    assert np.abs(lab.q - lab.path.value(lab.path.end_time())[:, 0]).max() < 0.002
+
+
 def test_but_an_arm_that_was_moved_while_it_stood_stops():
     lab = paused_in_motion(0.018)
     lab.q = lab.q + 0.012
