@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.trajectories import PiecewisePolynomial
 
+from riseg_drake.app.terminal_operator import TerminalOperator
 from riseg_drake.geometry.se3 import translation
 from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest
 from riseg_drake.robot.kinematics import MIN_CLEARANCE, PandaKinematics
@@ -14,11 +15,14 @@ from riseg_drake.robot.supervisor import Cause, Mode
 from riseg_drake.stations.command_process import CommandProcess
 from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.hardware import TARGET_PERIOD
+from riseg_drake.stations.lcm_reception import Reception
 
 ARRIVED = 0.01
 """The arm is where it should be when every joint is this close, rad."""
 LINGER = 1.0
 """Targets go on for this long at the end of a motion, s: the last ones are never reached."""
+PATIENCE = 60.0
+"""A motion may take so much longer than planned, s: a driver that died has to be started by hand."""
 ROOM = 0.01
 """Arm and tool keep this far from the table and from each other on the way, m."""
 
@@ -106,32 +110,67 @@ class WayBack:
 
 
 def travel(
+    plan: Callable[[NDArray], PiecewisePolynomial],
     commands: CommandProcess,
-    motion: PiecewisePolynomial,
-    clock: EvenClock,
+    reception: Reception,
+    operator: TerminalOperator,
     look: Callable[[], None] = lambda: None,
 ) -> None:
     """Have a motion done, and wait until the arm has arrived; `look` is called all the while.
 
-    `clock` is that of all targets.
+    `plan` finds it from where the arm is, rad [7]; after a stop once more, at the operator's word.
 
-    Raises TravelError if the arm is stopped on its way.
+    Raises TravelError if the arm is stopped on its way and the operator does not want it to go on.
     """
+    assert reception.status is not None
+    stop = _travel_once(plan(reception.status.position), commands, reception.clock, look, operator.tell)
+    while stop:
+        said = operator.released(stop)
+        if said is None:
+            time.sleep(0.02)
+        elif not said:
+            raise TravelError(stop)
+        else:
+            try:
+                motion = plan(reception.status.position)
+            except TravelError as error:
+                operator.tell(f"the arm stays stopped: {error}")
+                continue
+            commands.release(anew=True)
+            commands.begin_path()
+            stop = _travel_once(motion, commands, reception.clock, look, operator.tell)
+
+
+def _travel_once(
+    motion: PiecewisePolynomial,
+    commands: CommandProcess,
+    clock: EvenClock,
+    look: Callable[[], None],
+    tell: Callable[[str], None],
+) -> str:
+    """Why the arm was stopped on its way, in a line; empty where it has arrived; else raises TravelError."""
     start, duration = clock(), motion.end_time()
     for t in np.arange(0, duration + LINGER, TARGET_PERIOD):
         commands.send_target(start + t, motion.value(min(t, duration))[:, 0])
     goal = motion.value(duration)[:, 0]
-    deadline = time.monotonic() + duration + 15
+    deadline = time.monotonic() + duration + PATIENCE
+    is_paused = False
     while time.monotonic() < deadline:
         look()
         time.sleep(0.02)
         report = commands.report
-        if report is None:
+        if report is None or report.words != commands.words:  # it is of before the operator's word
             continue
-        if report.state.mode in (Mode.STOPPED, Mode.ENDED):
-            raise TravelError(f"the arm was stopped: {told(report.state.cause)}")
+        stop = f"the arm is stopped: {told(report.state.cause)}"
+        if report.state.mode is Mode.ENDED:
+            raise TravelError(stop)
+        if report.state.mode is Mode.STOPPED:
+            return stop
+        if report.state.mode is Mode.PAUSED and not is_paused:
+            tell(f"paused: {told(report.state.cause)}")
+        is_paused = report.state.mode is Mode.PAUSED
         arrived = report.status is not None and np.abs(report.status.position - goal).max() < ARRIVED
         if arrived and report.behind == 0 and report.at_rest and clock() > start + duration + LINGER:
-            return
+            return ""
     cause = told(report.state.cause) or "it did not arrive in time" if report else "it says nothing"
     raise TravelError(f"the arm did not get to where it should: {cause}")

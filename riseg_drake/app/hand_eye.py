@@ -1,8 +1,11 @@
 """`riseg hand-eye`: is the camera where the scenario says? The arm moves over a scene that stands still."""
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
+from pydrake.trajectories import PiecewisePolynomial
 from rich.console import Console
 
 from riseg_drake.app.arm_travel import straight_motion, travel
@@ -13,6 +16,7 @@ from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.terminal_operator import TerminalOperator
 from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.pushing.time_law import SpeedLimits
 from riseg_drake.recording.whole_file import write_png
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture, tip_pointing_down
 from riseg_drake.robot.silhouette import RobotSilhouette
@@ -50,15 +54,10 @@ def hand_eye_command(
         camera = _Collector(reception, config.camera, kinematics)
         with CommandProcess(config.lcm, config.command, config.panda) as commands:
             operator.confirm("the arm goes to where it looks from, and 4 cm around; nothing else may move")
-            assert reception.status is not None
-            here = reception.status.position
             for index, q in enumerate(postures):
                 # The way there is not of interest; the moves after it are slow, for enough pictures.
-                motion = straight_motion(kinematics, here, q, limits)
-                if index:
-                    motion.ScaleTime(1 / SLOWER)
-                travel(commands, motion, reception.clock, camera.look if index else lambda: None)
-                here = q
+                plan = partial(_move, kinematics, q, limits, SLOWER if index else 1.0)
+                travel(plan, commands, reception, operator, camera.look if index else lambda: None)
     errors = flow_errors(camera.frames)
     if not errors:
         raise HardwareError(
@@ -117,6 +116,15 @@ class _Collector:
                 robot=self._silhouette.mask(sight.position),
             )
         )
+
+
+def _move(
+    kinematics: PandaKinematics, q_to: NDArray, limits: SpeedLimits, share: float, q_from: NDArray
+) -> PiecewisePolynomial:
+    """The straight motion at a share of its speed."""
+    motion = straight_motion(kinematics, q_from, q_to, limits)
+    motion.ScaleTime(1 / share)
+    return motion
 
 
 def _postures(kinematics: PandaKinematics, config: HardwareStationConfig) -> list[np.ndarray]:

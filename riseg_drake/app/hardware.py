@@ -9,6 +9,7 @@ import numpy as np
 from drake import lcmt_panda_status
 from pydrake.geometry import Meshcat, StartMeshcat
 from pydrake.systems.framework import Context
+from pydrake.trajectories import PiecewisePolynomial
 from rich.console import Console
 
 from riseg_drake.app.arm_travel import ARRIVED, WayBack, straight_motion, travel
@@ -314,12 +315,15 @@ class _Session:
         here = self._reception.status.position
         if np.abs(here - q).max() < ARRIVED / 2:
             return
-        motion = straight_motion(kinematics, here, q, planned_limits(self._scenario))
+
+        def plan(q_from: np.ndarray) -> PiecewisePolynomial:
+            return straight_motion(kinematics, q_from, q, planned_limits(self._scenario))
+
         turn = np.degrees(np.abs(q - here).max())
         self._operator.confirm(
-            f"the arm goes to where it looks from, {turn:.0f} degrees in {motion.end_time():.1f} s"
+            f"the arm goes to where it looks from, {turn:.0f} degrees in {plan(here).end_time():.1f} s"
         )
-        travel(commands, motion, self._reception.clock)
+        travel(plan, commands, self._reception, self._operator)
 
     def _permit(self, push: Push) -> Permission:
         said = self._operator.permit(push)

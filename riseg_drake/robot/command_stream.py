@@ -28,10 +28,9 @@ from riseg_drake.robot.supervisor import (
 )
 from riseg_drake.robot.target_playout import PlayoutParameters, TargetPlayout
 from riseg_drake.robot.tip_geometry import TipGeometry
+from riseg_drake.robot.velocity_drift import VelocityDrift
 
 POSITION, VELOCITY = "position", "velocity"
-STANDING = 0.1
-"""An arm stands still this long after its commands do, s: the driver's filter of 30 Hz has died away."""
 LONGEST_STOP = 0.25
 """A stop must be possible in this time, s: 0.3 s less some periods in which its cause is noticed."""
 
@@ -87,20 +86,6 @@ class ArmStatus:
 class CommandStream:
     """See above. `state` is what the supervisor thinks; `position` what was commanded last, rad [7]."""
 
-    DRIFT_GAIN = 3.0
-    """Velocity mode: the arm's drift is taken back with this rate, 1/s ..."""
-    DRIFT_SPEED = 0.01
-    """... at most this fast, rad/s, ..."""
-    SLOW = 0.1
-    """... and only while no joint is faster than this, rad/s: in fast motion lag looks like drift."""
-    DRIFT_NOTICED, DRIFT_LEFT = 3e-4, 5e-5
-    """Drift counts from the one on, until less than the other is left, rad: seven joints together are then
-    within a millimetre at the tip, and noise, of which the filter leaves a ninth, moves nothing."""
-    DRIFT_FILTER = 0.2
-    """Time constant of the filter of measured drift, s."""
-    LAG = 0.0053
-    """The driver's low pass of 30 Hz keeps the arm so far behind its commands, s."""
-
     def __init__(self, parameters: CommandParameters, tip: TipGeometry, robot: RobotLimits):
         parameters.check(robot)
         self._parameters = parameters
@@ -113,14 +98,9 @@ class CommandStream:
         self._takes_targets = True
         self._limiter: CommandLimiter | None = None  # None: the next command is where the arm is
         self._is_silent = True
-        self._drift = np.zeros(7)
-        self._drift_seen = np.zeros(7)
-        self._drift_taken_back = np.zeros(7, bool)
+        self._drift = VelocityDrift(self.period)
         self._contacts: list[tuple[float, float]] = []
-        self._standing = 0.0  # s, for which the arm has stood in a pause
         self._status: ArmStatus | None = None
-        self._now = -np.inf  # of the last step
-        self._unheard = np.zeros(7)  # see _note_silence
         self.state = SafetyState()
         self.words = 0
         """How often the operator has said that the arm may move again."""
@@ -197,7 +177,7 @@ class CommandStream:
         `now` and `image_time`, that of the newest picture, are in s by the steady clock of the status.
         """
         before = self.state
-        self._note_silence(now, status)
+        self._listen(now, status)
         target = self._playout.advance(self.period) if before.may_move else None
         seen = self._look(now, status, image_time, target)
         if before.mode is not Mode.WAITING or self.at_rest:  # a word that came while it brakes has to wait
@@ -207,8 +187,8 @@ class CommandStream:
             self._set_out(before, status)
         elif self.state.may_move and target is not None:
             assert self._limiter is not None
-            self._correct_drift(now)
-            self._limiter.follow(target._replace(position=target.position + self._drift))
+            self._take_drift_back(now)
+            self._limiter.follow(target._replace(position=target.position + self._drift.value))
         elif self._limiter is not None:
             self._limiter.stop()
         if not self.state.may_move:
@@ -216,42 +196,36 @@ class CommandStream:
         self._note_where_it_stands(seen)
         return self._fall_silent() if self._has_no_hearer(seen) else self._command()
 
-    def _note_silence(self, now: float, status: ArmStatus | None) -> None:
-        """How far each joint was told to go since the arm was last heard of, rad [7]: it may have gone, or not."""
-        speed = np.zeros(7) if self._limiter is None else np.abs(self._limiter.velocity)
-        is_news = status is not None and (self._status is None or status.time > self._status.time)
-        if is_news and self.state.cause is not Cause.STATUS_OLD:
-            self._unheard = speed * (now - status.time)
-        elif np.isfinite(self._now):
-            self._unheard = self._unheard + speed * (now - self._now)
-        self._now = now
+    def _listen(self, now: float, status: ArmStatus | None) -> None:
+        """See VelocityDrift.listen."""
+        is_news = status is not self._status and self.state.cause is not Cause.STATUS_OLD
+        speed = np.zeros(7) if self._limiter is None else self._limiter.velocity
+        self._drift.listen(now, speed, status.time if status is not None and is_news else None)
 
     def _note_where_it_stands(self, seen: Observation) -> None:
         """Velocity mode: in a pause the arm is held where it came to rest, which no sum of velocities tells.
 
         Only once it stands and its status is there: nobody can have moved it by hand while that went on. Where
-        that was late, no further away than what it was told meanwhile explains: of velocities that came late,
-        too, it has followed some and not others.
+        that was late, no further away than what it was told meanwhile explains.
         """
-        stands = self.state.mode is Mode.PAUSED and self._limiter is not None and self._limiter.at_rest
-        if self.mode != VELOCITY or not stands or status_is_old(seen, self._parameters.safety):
-            self._standing = 0.0
+        if self.mode != VELOCITY:
             return
-        self._standing += self.period
-        if not self._standing - self.period < STANDING <= self._standing:
+        limiter, safety = self._limiter, self._parameters.safety
+        stands = self.state.mode is Mode.PAUSED and limiter is not None and limiter.at_rest
+        if not self._drift.has_stood(stands and not status_is_old(seen, safety)):
             return
-        assert self._limiter is not None
+        assert limiter is not None
         assert self._status is not None
-        drift = self._limiter.position - self._status.position
-        unexplained = np.abs(drift - self._drift) - self._unheard
-        if self.state.cause is Cause.IMAGES_OLD or (unexplained <= self._parameters.safety.displacement).all():
-            self._drift = drift
+        measured = self._status.position
+        was_seen = self.state.cause is Cause.IMAGES_OLD
+        if was_seen or self._drift.explains(limiter.position, measured, safety.displacement):
+            self._drift.value = limiter.position - measured
 
     def _set_out(self, before: SafetyState, status: ArmStatus) -> None:
         """Begin to move, or go on after a pause, at the path's nearest point; stay where that is too far."""
         if before.mode is Mode.PAUSED:
             assert self._limiter is not None
-            here = self._limiter.stop() - self._drift
+            here = self._limiter.stop() - self._drift.value
         else:
             here = self._start(status)
             if not self._playout.distance(here) <= self._parameters.safety.off_path:
@@ -271,7 +245,7 @@ class CommandStream:
         if self._limiter is None:
             self._limiter = CommandLimiter(position, self._robot, self.period, self._parameters.limits)
         self._limiter.restart(position)
-        self._drift, self._drift_seen = np.zeros(7), np.zeros(7)
+        self._drift.restart()
         self._playout.halt()
 
     def _has_no_hearer(self, seen: Observation) -> bool:
@@ -311,7 +285,7 @@ class CommandStream:
         gap = self._gap_before(status)
         self._status = status
         limiter, measured = self._limiter, np.zeros(7) if status is None else status.position
-        rest = measured if limiter is None else limiter.rest_position - self._drift
+        rest = measured if limiter is None else limiter.rest_position - self._drift.value
         time = self._playout.time
         return Observation(
             now=now,
@@ -325,10 +299,10 @@ class CommandStream:
             p_WE=self._tip.position(rest),
             held_back=limiter is not None and limiter.held_back,
             contradicted=status is not None and status.contradicted,
-            lag=0.0 if limiter is None else _largest(measured - (limiter.position - self._drift)),
+            lag=0.0 if limiter is None else _largest(measured - (limiter.position - self._drift.value)),
             gap=0.0
             if limiter is None or target is None
-            else _largest(target.position + self._drift - limiter.position),
+            else _largest(target.position + self._drift.value - limiter.position),
         )
 
     def _gap_before(self, status: ArmStatus | None) -> float:
@@ -340,27 +314,13 @@ class CommandStream:
             return np.inf
         return status.time - last.time if status.gap is None else status.gap
 
-    def _correct_drift(self, now: float) -> None:
-        """Velocity mode: what was commanded is not quite where the arm came to."""
-        if self.mode != VELOCITY:
-            return
-        assert self._limiter is not None
-        assert self._status is not None
-        speed = self._limiter.velocity
-        if _largest(speed) > self.SLOW:
-            self._drift_seen = np.zeros(7)
-            return
-        # A velocity holds from its command to the next: half a period on the mean, of the one that has passed.
-        behind = now - self._status.time + self.LAG - self.period / 2
-        told = self._limiter.position - self._drift - behind * speed
-        share = self.period / (self.period + self.DRIFT_FILTER)
-        was_noticed = self._drift_taken_back
-        self._drift_seen = self._drift_seen + share * (told - self._status.position - self._drift_seen)
-        self._drift_taken_back = np.abs(self._drift_seen) > np.where(
-            was_noticed, self.DRIFT_LEFT, self.DRIFT_NOTICED
-        )
-        rate = np.clip(self.DRIFT_GAIN * self._drift_seen, -self.DRIFT_SPEED, self.DRIFT_SPEED)
-        self._drift = self._drift + self.period * rate * self._drift_taken_back
+    def _take_drift_back(self, now: float) -> None:
+        """Velocity mode: see VelocityDrift."""
+        if self.mode == VELOCITY:
+            assert self._limiter is not None
+            assert self._status is not None
+            told, speed = self._limiter.position, self._limiter.velocity
+            self._drift.take_back(now - self._status.time, told, speed, self._status.position)
 
 
 def _largest(difference: NDArray) -> float:

@@ -8,8 +8,8 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from riseg_drake.app import arm_watch
-from riseg_drake.app.arm_travel import WayBack
+from riseg_drake.app import arm_travel, arm_watch
+from riseg_drake.app.arm_travel import TravelError, WayBack, straight_motion, travel
 from riseg_drake.app.arm_watch import ArmWatch
 from riseg_drake.app.interactions import Progress
 from riseg_drake.pushing.push import ArmPhase
@@ -148,3 +148,90 @@ def test_an_arm_that_was_led_away_in_a_push_comes_back_at_the_operators_word_and
     assert (np.array(room.lab.speeds) <= 0.35 * room.lab.robot.velocity).all()
     assert room.watch.pauses <= 1
     assert not room.progress.end
+
+
+class FirstWay:
+    """What `travel` deals with, in one; the clock turns where it sleeps."""
+
+    def __init__(self, monkeypatch, mode):
+        self.lab = Lab(mode, q=Q_OBSERVE - 0.2)
+        self.words, self.told, self.deeds = 0, [], []
+        monkeypatch.setattr(arm_travel.time, "monotonic", lambda: self.lab.now)
+        monkeypatch.setattr(arm_travel.time, "sleep", self.lab.run)
+        self.clock = lambda: self.lab.now
+
+    send_target = Room.send_target
+    release, begin_path = Room.release, Room.begin_path
+
+    @property
+    def status(self):
+        return self.lab.status
+
+    @property
+    def report(self):
+        stream = self.lab.stream
+        return SimpleNamespace(
+            state=stream.state,
+            words=stream.words,
+            status=self.lab.status,
+            behind=stream.behind,
+            at_rest=stream.at_rest,
+        )
+
+    def tell(self, text):
+        self.told.append(text)
+
+    def released(self, stop):
+        """A second after every stop the next of the deeds is done, which says whether to go on."""
+        self.told.append(stop)
+        self.lab.run(1.0)
+        return self.deeds.pop(0)()
+
+
+@pytest.fixture
+def first_way(monkeypatch, mode):
+    return FirstWay(monkeypatch, mode)
+
+
+def plan_to_observe(q_from):
+    return straight_motion(PandaKinematics(), q_from, Q_OBSERVE, SpeedLimits(0.28, 0.24, 0.1))
+
+
+@pytest.mark.parametrize("mode", ["velocity", "position"])
+def test_on_its_very_first_way_too_a_stopped_arm_goes_on_at_the_operators_word_from_where_it_is(first_way):
+    lab = first_way.lab
+    looks = iter(range(10**6))
+
+    def look():
+        now = next(looks)
+        if now == 50:
+            lab.die()
+        elif now == 100:
+            lab.guide(0.1)
+            lab.start_anew()
+
+    def forget():
+        assert not lab.stream.state.may_move
+        lab.forget()
+        return True
+
+    first_way.deeds = [lambda: None, forget]
+    travel(plan_to_observe, first_way, first_way, first_way, look)
+    assert np.abs(lab.q - Q_OBSERVE).max() < 2e-3
+    assert [line.split(":")[0] for line in first_way.told] == ["paused", *2 * ["the arm is stopped"]]
+    assert lab.speeds[0].max() < 1e-2
+    assert (np.array(lab.speeds) <= 0.35 * lab.robot.velocity).all()
+
+
+@pytest.mark.parametrize("mode", ["velocity"])
+def test_where_the_operator_does_not_want_it_the_first_way_ends_there_with_the_reason(first_way):
+    first_way.deeds = [lambda: False]
+    looks = iter(range(10**6))
+    with pytest.raises(TravelError, match="pushes against the arm"):
+        travel(
+            plan_to_observe,
+            first_way,
+            first_way,
+            first_way,
+            lambda: first_way.lab.push_against(60.0) if next(looks) == 50 else None,
+        )

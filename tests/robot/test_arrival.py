@@ -53,7 +53,7 @@ def test_lag_in_a_slow_motion_is_not_taken_for_drift():
     lab.path, lab.path_start = SteadyMotion(READY, slow, 3.0), lab.now
     lab.run(2.5)
     assert np.abs(lab.stream._limiter.velocity).max() == pytest.approx(0.1 - 0.005, abs=0.006)
-    np.testing.assert_array_equal(lab.stream._drift, np.zeros(7))
+    np.testing.assert_array_equal(lab.stream._drift.value, np.zeros(7))
 
 
 class SteadyMotion:

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from riseg_drake.robot.command_stream import LONGEST_STOP, CommandStream
+from riseg_drake.robot.command_stream import LONGEST_STOP
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.supervisor import REFLEX, USER_STOPPED, Cause, Mode, SafetyState
+from riseg_drake.robot.velocity_drift import VelocityDrift
 from tests.robot.lab import PERIOD, Lab
 
 THERE = READY + 0.5 * np.array([1, -1, 1, 1, -1, 1, 1])
@@ -210,7 +211,7 @@ def paused_in_motion(drifted):
     lab = Lab("velocity")
     lab.go(READY + np.array([0.8, 0, 0, 0, 0, 0, 0]))
     lab.run(1.2)
-    assert lab.speeds[-1].max() > CommandStream.SLOW
+    assert lab.speeds[-1].max() > VelocityDrift.SLOW
     lab.q = lab.q + np.array([drifted, 0, 0, 0, 0, 0, 0])
     lab.delay_images()
     lab.run(0.5)
