@@ -24,10 +24,10 @@ from riseg_drake.stations.lcm_channels import LcmConfig
 URL = "udpm://239.255.76.67:7698?ttl=0"
 """A network of its own, so that no arm hears it."""
 STATUS_PERIOD, IMAGE_PERIOD = 0.005, 1 / 15
-SWING = np.array([0.38, 0.05, 0.05, 0.05, 0.38, 0.05, 0.38])
-"""rad; the joints swing so far to each side, ..."""
+SWINGING, NEARLY = [0, 4, 6], 0.95
+"""Joints that swing, to both sides of a middle, and their greatest speed as a share of that of commands."""
 SWING_TIME = 3.0
-"""... there and back in that time, s."""
+"""There and back, s."""
 BEFORE = 1.25 * SWING_TIME + PlayoutParameters().delay
 """s of motion before the cause: the joints are at their fastest then."""
 AFTER = 1.2
@@ -48,6 +48,8 @@ class _World:
 
     arm: IdealArm
     commands: CommandProcess
+    swing: NDArray[np.float64]
+    """How far the joints swing to each side, rad [7]."""
     start: float
     """Wall time, s, at which the arm begins to swing."""
     speaks: bool = True
@@ -99,8 +101,11 @@ def bench_stops(console: Console) -> None:
 def measure_stop(happen: Callable[[_World], None], patience: float) -> Stop:
     """Let an arm swing, let something happen, and watch the commands; `patience` s pass before it counts."""
     config, parameters, panda = LcmConfig(url=URL), CommandParameters(), PandaDescription()
+    swing = np.zeros(7)
+    fastest = NEARLY * parameters.limits.velocity * panda.limits.velocity
+    swing[SWINGING] = fastest[SWINGING] * SWING_TIME / (2 * np.pi)
     with CommandProcess(config, parameters, panda) as commands:
-        world = _World(IdealArm(config), commands, time.time())
+        world = _World(IdealArm(config), commands, swing, time.time())
         _live(world, BEFORE)
         cause = time.time()
         happen(world)
@@ -142,7 +147,7 @@ def _live(world: _World, seconds: float) -> None:
             picture = now
         if world.plans and now - target >= TARGET_PERIOD:
             phase = 2 * np.pi * (now - world.start) / SWING_TIME
-            world.commands.send_target(now, READY + SWING * (1 - np.cos(phase)))
+            world.commands.send_target(now, READY + world.swing * (1 - np.cos(phase)))
             target = now
         time.sleep(STATUS_PERIOD)
         world.arm.listen()

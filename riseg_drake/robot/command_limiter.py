@@ -32,6 +32,8 @@ _CREEP = 1e-3  # rad/s; Ruckig wants some speed, also where a joint has none tow
 _LOOKS = 12  # at most, at the speeds of a stop
 
 
+LONGEST_STOP = 0.25
+"""A stop must be possible in this time, s: 0.3 s less some periods in which its cause is noticed."""
 LEAST_MARGIN, MOST_MARGIN = 0.005, 0.5
 """Of room to the ends of the joints' ranges, rad: stops go beyond theirs by micrometres, arms follow within
 milliradians; and with more than half a radian joints 4 and 6 would hardly turn."""
@@ -118,12 +120,8 @@ class CommandLimiter:
         self._way = InputParameter(7)
         self._way.max_acceleration = list(self._acceleration_limit)
         self._way.max_jerk = list(self._jerk_limit)
-        self._braking = InputParameter(7)
-        self._braking.control_interface = ControlInterface.Velocity
-        self._braking.synchronization = Synchronization.Phase  # straight on, where that is possible
-        self._braking.max_acceleration = list(limits.stop_acceleration * robot.acceleration)
-        self._braking.max_jerk = list(limits.stop_jerk * robot.jerk)
-        self._braking.target_velocity = [0.0] * 7
+        self._braking = _braking(limits.stop_acceleration * robot.acceleration, limits.stop_jerk * robot.jerk)
+        self._calm_braking = _braking(self._acceleration_limit, self._jerk_limit)
         self.restart(position)
 
     def restart(self, position: NDArray) -> None:
@@ -133,7 +131,7 @@ class CommandLimiter:
         self.acceleration = np.zeros(7)
         self.held_back = False
         """Whether the last wish led out of the joints' ranges; the arm stays within, or comes to a stop."""
-        self._stop, self._stopped_for = self._stop_from(self.position, self.velocity, self.acceleration), 0.0
+        self._stop, self._stopped_for, self._is_calm = self._stop_from_here(self._braking), 0.0, False
 
     @property
     def at_rest(self) -> bool:
@@ -149,17 +147,31 @@ class CommandLimiter:
         """Advance by one period towards a target; returns the command, rad [7]."""
         target, leads_out = self._within_ranges(target)
         candidate = self._follow_linearly(target) or self._approach(target)
-        stop = None if candidate is None else self._stop_from(*candidate)
+        stop = None if candidate is None else self._stop_from(*candidate, self._braking)
         if candidate is None or stop is None or not self._ends_in_ranges(stop):
             self.held_back = True
         elif self._is_slow_enough(stop):
             self.position, self.velocity, self.acceleration = candidate
-            self._stop, self._stopped_for, self.held_back = stop, 0.0, leads_out
+            self._stop, self._stopped_for, self._is_calm = stop, 0.0, False
+            self.held_back = leads_out
             return self.position
         return self.stop()
 
     def stop(self) -> NDArray[np.float64]:
         """Advance by one period of coming to rest; returns the command, rad [7]."""
+        if self._is_calm:  # it was no more than a pause until now
+            self._stop, self._stopped_for, self._is_calm = self._stop_from_here(self._braking), 0.0, False
+        return self._go_on_with_stop()
+
+    def pause(self) -> NDArray[np.float64]:
+        """The same as calmly as motions end, where that is soon enough; returns the command, rad [7]."""
+        if self._stopped_for == 0.0 and not self._is_calm:
+            calm = self._stop_from_here(self._calm_braking)
+            if calm.duration <= LONGEST_STOP and self._ends_in_ranges(calm) and self._is_slow_enough(calm):
+                self._stop, self._is_calm = calm, True
+        return self._go_on_with_stop()
+
+    def _go_on_with_stop(self) -> NDArray[np.float64]:
         self._stopped_for += self._period
         if self._stopped_for >= self._stop.duration:
             self.position = self.rest_position
@@ -232,12 +244,17 @@ class CommandLimiter:
         position, velocity, acceleration = way.at_time(self._period)[:3]
         return np.array(position), np.array(velocity), np.array(acceleration)
 
-    def _stop_from(self, position: NDArray, velocity: NDArray, acceleration: NDArray) -> Trajectory:
-        self._braking.current_position = list(position)
-        self._braking.current_velocity = list(velocity)
-        self._braking.current_acceleration = list(acceleration)
+    def _stop_from_here(self, braking: InputParameter) -> Trajectory:
+        return self._stop_from(self.position, self.velocity, self.acceleration, braking)
+
+    def _stop_from(
+        self, position: NDArray, velocity: NDArray, acceleration: NDArray, braking: InputParameter
+    ) -> Trajectory:
+        braking.current_position = list(position)
+        braking.current_velocity = list(velocity)
+        braking.current_acceleration = list(acceleration)
         stop = Trajectory(7)
-        result = self._otg.calculate(self._braking, stop)
+        result = self._otg.calculate(braking, stop)
         if result not in (Result.Working, Result.Finished):
             raise RuntimeError(f"no stop from {position}, {velocity}, {acceleration}: {result}")
         return stop
@@ -260,3 +277,13 @@ class CommandLimiter:
         position, velocity = np.array([stop.at_time(time)[:2] for time in times]).swapaxes(0, 1)
         lowest, highest = self._velocity_range(position)
         return bool(((lowest <= velocity) & (velocity <= highest)).all())
+
+
+def _braking(acceleration: NDArray, jerk: NDArray) -> InputParameter:
+    """Coming to rest with at most these, rad/s^2 and rad/s^3, each [7]."""
+    braking = InputParameter(7)
+    braking.control_interface = ControlInterface.Velocity
+    braking.synchronization = Synchronization.Phase  # straight on, where that is possible
+    braking.max_acceleration, braking.max_jerk = list(acceleration), list(jerk)
+    braking.target_velocity = [0.0] * 7
+    return braking

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.robot.command_limiter import CommandLimiter, CommandLimits, Target
+from riseg_drake.robot.command_limiter import LONGEST_STOP, CommandLimiter, CommandLimits, Target
 from riseg_drake.robot.limits import RobotLimits
 from riseg_drake.robot.supervisor import (
     MOVE,
@@ -31,8 +31,6 @@ from riseg_drake.robot.tip_geometry import TipGeometry
 from riseg_drake.robot.velocity_drift import VelocityDrift
 
 POSITION, VELOCITY = "position", "velocity"
-LONGEST_STOP = 0.25
-"""A stop must be possible in this time, s: 0.3 s less some periods in which its cause is noticed."""
 
 
 @dataclass
@@ -190,7 +188,8 @@ class CommandStream:
             self._take_drift_back(now)
             self._limiter.follow(target._replace(position=target.position + self._drift.value))
         elif self._limiter is not None:
-            self._limiter.stop()
+            # Pictures that are late are no danger: no reason to brake at the driver's limits.
+            (self._limiter.pause if self.state.cause is Cause.IMAGES_OLD else self._limiter.stop)()
         if not self.state.may_move:
             self._playout.halt()
         self._note_where_it_stands(seen)

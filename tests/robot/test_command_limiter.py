@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest, steady_speed
-from riseg_drake.robot.command_limiter import CommandLimiter, CommandLimits, Target
+from riseg_drake.robot.command_limiter import LONGEST_STOP, CommandLimiter, CommandLimits, Target
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.limits import FR3_LIMITS, PANDA_LIMITS
 
@@ -112,6 +112,48 @@ def test_the_longest_stop_is_no_longer_than_said(robot):
     assert longest * PERIOD > 0.05  # the test has seen real stops
 
 
+def in_fast_motion(robot):
+    limiter = CommandLimiter(READY, robot, PERIOD)
+    goal = READY + np.array([0.5, -0.4, 0.3, 0.2, 0.5, 0.4, -0.5])
+    while np.abs(limiter.velocity / robot.velocity).max() < 0.25:
+        limiter.follow(still(goal))
+    return limiter
+
+
+def until_at_rest(limiter, step):
+    before, commands = limiter.velocity, [limiter.position]
+    while not limiter.at_rest:
+        commands.append(step())
+    velocity = np.diff(commands, axis=0) / PERIOD
+    return np.abs(np.diff(np.vstack([before, velocity, 0 * before]), axis=0)) / PERIOD
+
+
+@pytest.mark.parametrize("robot", [PANDA_LIMITS, FR3_LIMITS], ids=["panda", "fr3"])
+def test_a_pause_brakes_no_harder_than_motions_do_and_a_stop_sooner(robot):
+    limits = CommandLimits()
+    paused, stopped = in_fast_motion(robot), in_fast_motion(robot)
+    calm = until_at_rest(paused, paused.pause) / robot.acceleration
+    hard = until_at_rest(stopped, stopped.stop) / robot.acceleration
+    assert calm.max() == pytest.approx(limits.acceleration, rel=0.05)
+    assert limits.stop_acceleration * 1.001 > hard.max() > 1.3 * limits.acceleration
+    assert len(hard) < len(calm) <= LONGEST_STOP / PERIOD
+
+
+def test_a_stop_in_a_pause_is_as_hard_as_any_from_there_on():
+    limiter = in_fast_motion(PANDA_LIMITS)
+    limiter.pause()
+    limiter.pause()
+    other = CommandLimiter(limiter.position, PANDA_LIMITS, PERIOD)
+    other.position, other.velocity, other.acceleration = (
+        limiter.position,
+        limiter.velocity,
+        limiter.acceleration,
+    )
+    other._is_calm = True
+    np.testing.assert_array_equal(until_at_rest(limiter, limiter.stop), until_at_rest(other, other.stop))
+    assert np.ptp(limiter.position - limiter.rest_position) == 0
+
+
 def speed_towards_an_end(robot, end):
     """Largest share of what an FR3 may have, where all joints are to go to one end at full speed."""
     start = FR3_LIMITS.position_middle
@@ -137,7 +179,7 @@ def test_a_stop_that_a_fast_joint_makes_long_may_not_leave_a_slow_one_too_fast_n
     fast = slow.copy()
     fast[6] = CommandLimits().velocity * FR3_LIMITS.velocity[6]
     for velocity, expected in ((slow, True), (fast, False)):
-        stop = limiter._stop_from(position, velocity, np.zeros(7))
+        stop = limiter._stop_from(position, velocity, np.zeros(7), limiter._braking)
         states = np.array([stop.at_time(t)[:2] for t in np.linspace(0, stop.duration, 100)])
         bounds = CommandLimits().velocity * FR3_LIMITS.velocity_range(states[:, 0])[1]
         assert (states[:, 1] <= bounds).all() == expected

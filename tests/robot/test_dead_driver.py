@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from riseg_drake.robot.command_stream import LONGEST_STOP
+from riseg_drake.robot.command_limiter import LONGEST_STOP
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.supervisor import REFLEX, USER_STOPPED, Cause, Mode, SafetyState
 from riseg_drake.robot.velocity_drift import VelocityDrift

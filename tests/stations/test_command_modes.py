@@ -70,15 +70,22 @@ def robot(request):
     return (request.param, *planned_run(request.param))
 
 
-def verdict_on(robot, parameters, wakes_late, interactions=INTERACTIONS):
-    """How calm the robot's own motion is over a whole run."""
+def verdict_on(robot, parameters, wakes_late, interactions=INTERACTIONS, pauses=False):
+    """How calm the robot's own motion is over a whole run, with a pause for late pictures in every motion."""
     name, q_observe, paths = robot
     session = DriverAndStream(parameters.mode, ROBOTS[name], q_observe, parameters, wakes_late=wakes_late).run(
         0.1
     )
     for path in paths[:interactions]:
         session.plan(path)
+        if pauses:
+            session.run(path.end_time() / 3)
+            session.shows_pictures = False
+            session.run(1)
+            session.shows_pictures = True
         session.run(path.end_time() + 1)
+        while session.stream.behind:
+            session.run(0.1)
     session.run(1)
     assert session.driver.end is None, session.driver.end
     np.testing.assert_allclose(session.robot.q_d, q_observe, atol=1e-3)
@@ -94,6 +101,12 @@ def is_calm(verdict):
 
 def test_in_the_mode_of_the_defaults_a_whole_run_is_calm_also_where_commands_come_unevenly(robot):
     assert is_calm(verdict_on(robot, CommandParameters(), jitter))
+
+
+def test_so_it_is_where_pictures_come_late_in_every_motion(robot):
+    verdict = verdict_on(robot, CommandParameters(), on_time, interactions=1, pauses=True)
+    assert verdict.at_limit == 0
+    assert verdict.acceleration_largest < 0.7  # of a stop: 1
 
 
 def test_positions_at_200_hz_come_out_at_a_limit_in_most_ticks(robot):
