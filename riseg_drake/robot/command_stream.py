@@ -97,6 +97,7 @@ class CommandStream:
         self._limiter: CommandLimiter | None = None  # None: the next command is where the arm is
         self._is_silent = True
         self._drift = VelocityDrift(self.period)
+        self._was_unseen = False  # whether in this pause the arm's status was too old at any time
         self._contacts: list[tuple[float, float]] = []
         self._status: ArmStatus | None = None
         self.state = SafetyState()
@@ -192,12 +193,14 @@ class CommandStream:
             (self._limiter.pause if self.state.cause is Cause.IMAGES_OLD else self._limiter.stop)()
         if not self.state.may_move:
             self._playout.halt()
+        was_old = self._was_unseen or self.state.cause is Cause.STATUS_OLD
+        self._was_unseen = was_old and self.state.mode is Mode.PAUSED
         self._note_where_it_stands(seen)
         return self._fall_silent() if self._has_no_hearer(seen) else self._command()
 
     def _listen(self, now: float, status: ArmStatus | None) -> None:
         """See VelocityDrift.listen."""
-        is_news = status is not self._status and self.state.cause is not Cause.STATUS_OLD
+        is_news = status is not self._status and not self._was_unseen
         speed = np.zeros(7) if self._limiter is None else self._limiter.velocity
         self._drift.listen(now, speed, status.time if status is not None and is_news else None)
 
@@ -205,7 +208,7 @@ class CommandStream:
         """Velocity mode: in a pause the arm is held where it came to rest, which no sum of velocities tells.
 
         Only once it stands and its status is there: nobody can have moved it by hand while that went on. Where
-        that was late, no further away than what it was told meanwhile explains.
+        that was late at any time of the pause, no further away than what it was told meanwhile explains.
         """
         if self.mode != VELOCITY:
             return
@@ -216,8 +219,7 @@ class CommandStream:
         assert limiter is not None
         assert self._status is not None
         measured = self._status.position
-        was_seen = self.state.cause is Cause.IMAGES_OLD
-        if was_seen or self._drift.explains(limiter.position, measured, safety.displacement):
+        if not self._was_unseen or self._drift.explains(limiter.position, measured, safety.displacement):
             self._drift.value = limiter.position - measured
 
     def _set_out(self, before: SafetyState, status: ArmStatus) -> None:

@@ -246,6 +246,31 @@ def test_in_velocity_mode_a_silence_explains_what_was_commanded_in_it_and_no_mor
     assert np.abs(lab.q - lab.path.value(lab.path.end_time())[:, 0]).max() < 0.002
 
 
+@pytest.mark.parametrize("pictures_end_first", [True, False])
+@pytest.mark.parametrize("mode", MODES)
+def test_pictures_that_are_late_too_do_not_explain_where_an_arm_is_after_a_silence(mode, pictures_end_first):
+    lab = Lab(mode)
+    lab.go(READY + np.array([0.8, 0, 0, 0, 0, 0, 0]))
+    lab.run(1.2)
+    if pictures_end_first:
+        lab.delay_images()
+        lab.run(0.5)
+    lab.delay_status(0.8, 0.02)
+    lab.run(0.3)
+    assert lab.stream.state == SafetyState(Mode.PAUSED, Cause.STATUS_OLD)
+    lab.delay_images()
+    lab.run(0.2)
+    lab.q = lab.q + np.array([0, 0.03, 0, 0, 0, 0, 0])
+    lab.command = (-np.inf, None)  # and there it is held
+    lab.run(0.8)
+    assert lab.stream.state == SafetyState(Mode.PAUSED, Cause.IMAGES_OLD)
+    lab.show_images()
+    lab.forget()
+    lab.run(1.0)
+    assert lab.stream.state == SafetyState(Mode.STOPPED, Cause.MOVED)
+    assert not np.max(lab.speeds)
+
+
 def test_but_an_arm_that_was_moved_while_it_stood_stops():
     lab = paused_in_motion(0.018)
     lab.q = lab.q + 0.012
