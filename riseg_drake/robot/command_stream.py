@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from riseg_drake.robot.command_limiter import LONGEST_STOP, CommandLimiter, CommandLimits, Target
 from riseg_drake.robot.limits import RobotLimits
 from riseg_drake.robot.supervisor import (
+    LOST,
     MOVE,
     Cause,
     Mode,
@@ -255,7 +256,7 @@ class CommandStream:
             return self._limiter is None
         if self._is_silent:
             return True
-        is_lost = seen.robot_mode != MOVE or self.state.cause is Cause.STATUS_ENDED
+        is_lost = seen.robot_mode != MOVE or self.state.cause in LOST
         if is_lost and not seen.lag <= self._parameters.safety.largest_gap:
             return True
         return self._limiter.at_rest and (is_lost or status_is_old(seen, self._parameters.safety))

@@ -102,6 +102,10 @@ class Cause(Enum):
     CLIENT_GONE = "the program that plans the motion is gone"
 
 
+LOST = frozenset({Cause.REFLEX, Cause.USER_STOP, Cause.NOT_READY, Cause.STATUS_ENDED})
+"""After these the arm has not followed what it was sent last, even if it takes commands again."""
+
+
 @dataclass(frozen=True)
 class Observation:
     """All that is looked at, at one moment."""

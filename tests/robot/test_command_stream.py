@@ -265,6 +265,22 @@ def test_after_a_reflex_it_is_silent_and_begins_anew_where_the_arm_is_at_the_ope
 
 
 @pytest.mark.parametrize("mode", ["position", "velocity"])
+@pytest.mark.parametrize("happens", [reflex, user_stop])
+def test_an_arm_that_is_ready_again_while_its_commands_still_brake_hears_none_once_they_are_at_rest(
+    happens, mode
+):
+    arm = in_motion(mode)
+    happens(arm)
+    arm.run(0.01)
+    arm.status = replace(arm.status, robot_mode=MOVE)
+    arm.run(LONGEST_STOP)
+    assert arm.stream.state.mode is Mode.STOPPED
+    first = len(arm.commands)
+    arm.run(0.5)
+    assert arm.commands[first:] == [None] * 100
+
+
+@pytest.mark.parametrize("mode", ["position", "velocity"])
 def test_a_word_that_comes_while_the_arm_brakes_waits_until_it_is_at_rest(mode):
     arm = in_motion(mode)
     force(arm)
