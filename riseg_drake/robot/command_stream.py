@@ -98,6 +98,7 @@ class CommandStream:
         self._limiter: CommandLimiter | None = None  # None: the next command is where the arm is
         self._is_silent = True
         self._drift = VelocityDrift(self.period)
+        self._p_WE_begun: NDArray[np.float64] | None = None  # see Observation
         self._was_unseen = False  # whether in this pause the arm's status was too old at any time
         self._contacts: list[tuple[float, float]] = []
         self._status: ArmStatus | None = None
@@ -234,6 +235,7 @@ class CommandStream:
                 self.state = SafetyState(Mode.STOPPED, Cause.GAP)
                 return
             self._rest_at(here)
+            self._p_WE_begun = self._tip.position(here)
         self._playout.resume_near(here)
 
     def _start(self, status: ArmStatus) -> NDArray[np.float64]:
@@ -299,6 +301,7 @@ class CommandStream:
             contact_planned=time is not None and any(a <= time <= b for a, b in self._contacts),
             tip_force=0.0 if status is None else self._tip.force(measured, status.torque_external),
             p_WE=self._tip.position(rest),
+            p_WE_begun=self._p_WE_begun,
             held_back=limiter is not None and limiter.held_back,
             contradicted=status is not None and status.contradicted,
             lag=0.0 if limiter is None else _largest(measured - (limiter.position - self._drift.value)),

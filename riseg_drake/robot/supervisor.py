@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 
 MOVE, REFLEX, USER_STOPPED = 2, 4, 5
 """`robot_mode` of lcmt_panda_status, as far as it matters here (franka::RobotMode)."""
+OVERSHOT = 0.01
+"""A stop at an end of the workspace leaves the tip beyond it by less, m: what it moves in a period or two."""
 
 
 @dataclass
@@ -135,6 +137,8 @@ class Observation:
     """Largest difference of the next target from the last command, rad."""
     contradicted: bool = False
     """Whether what comes as the arm's status cannot all be of one arm."""
+    p_WE_begun: NDArray[np.float64] | None = None
+    """Where the tip was when the arm set out, m [3]; from a little outside it may come back. None before."""
 
 
 @dataclass(frozen=True)
@@ -224,8 +228,17 @@ def _danger(seen: Observation, parameters: SafetyParameters) -> Cause:
         return Cause.FORCE
     if seen.held_back:
         return Cause.JOINT_LIMIT
-    if not ((seen.p_WE >= parameters.workspace_lower) & (seen.p_WE <= parameters.workspace_upper)).all():
+    if not _is_in_workspace(seen, parameters):
         return Cause.WORKSPACE
     if not seen.lag <= parameters.largest_gap:
         return Cause.NOT_FOLLOWING
     return Cause.NONE if seen.gap <= parameters.largest_gap else Cause.GAP
+
+
+def _is_in_workspace(seen: Observation, parameters: SafetyParameters) -> bool:
+    """Whether the tip would come to rest there, or no further outside than a stop at the end had left it."""
+    lower, upper = np.array(parameters.workspace_lower), np.array(parameters.workspace_upper)
+    if seen.p_WE_begun is not None:
+        lower = np.minimum(lower, np.maximum(seen.p_WE_begun, lower - OVERSHOT))
+        upper = np.maximum(upper, np.minimum(seen.p_WE_begun, upper + OVERSHOT))
+    return bool(((seen.p_WE >= lower) & (seen.p_WE <= upper)).all())

@@ -139,6 +139,18 @@ def test_a_pause_brakes_no_harder_than_motions_do_and_a_stop_sooner(robot):
     assert len(hard) < len(calm) <= LONGEST_STOP / PERIOD
 
 
+@pytest.mark.parametrize("robot", [PANDA_LIMITS, FR3_LIMITS], ids=["panda", "fr3"])
+def test_a_pause_in_which_calm_braking_would_take_too_long_is_a_stop(robot):
+    limiter, joint = CommandLimiter(READY, robot), int(np.argmax(robot.velocity / robot.acceleration))
+    goal = READY.copy()
+    goal[joint] += 1.2
+    fastest = CommandLimits().velocity * robot.velocity[joint]
+    assert fastest > LONGEST_STOP * CommandLimits().acceleration * robot.acceleration[joint]
+    while limiter.velocity[joint] < 0.999 * fastest:
+        limiter.follow(still(goal))
+    assert len(until_at_rest(limiter, limiter.pause)) <= LONGEST_STOP / PERIOD
+
+
 def test_a_stop_in_a_pause_is_as_hard_as_any_from_there_on():
     limiter = in_fast_motion(PANDA_LIMITS)
     limiter.pause()

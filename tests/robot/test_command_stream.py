@@ -337,6 +337,19 @@ def test_a_plan_that_leads_out_of_the_workspace_is_a_stop_within_it():
     assert heights[0] > lowest + 0.02
     assert lowest - 1e-3 < min(heights) < lowest + 0.01
     assert within_limits(arm.sent())
+    # A little outside now, where the stop has ended, it goes back at the operator's word, and no further out.
+    assert kinematics.X_WE(arm.status.position)[2, 3] < lowest
+    arm.stream.abandon_path()
+    arm.stream.release()
+    arm.stream.begin_path()
+    arm.step()
+    arm.plan(READY)
+    arm.run(8)
+    np.testing.assert_allclose(arm.status.position, READY, atol=1e-5)
+    arm.plan(down)
+    arm.run(10)
+    assert arm.stream.state.cause is Cause.WORKSPACE
+    assert lowest - 2e-3 < kinematics.X_WE(arm.status.position)[2, 3] < lowest
 
 
 def test_contact_is_allowed_in_a_push_only():

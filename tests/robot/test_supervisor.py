@@ -108,6 +108,24 @@ def test_what_is_no_number_is_a_danger(seen, cause):
     assert state.cause is cause
 
 
+@pytest.mark.parametrize(
+    ("begun", "now", "may_move"),
+    [
+        (-0.005, -0.005, True),
+        (-0.005, -0.006, False),
+        (-0.02, -0.009, True),
+        (-0.02, -0.011, False),
+        (0.1, -0.001, False),
+        (np.nan, 0.1, False),
+    ],
+)
+def test_from_a_little_outside_the_workspace_the_tip_may_come_back_but_go_no_further(begun, now, may_move):
+    for axis, end, outwards in ((2, 0.0, 1), (1, 0.6, -1)):
+        tips = np.full((2, 3), GOOD.p_WE)
+        tips[:, axis] = end + outwards * np.array([begun, now])
+        assert after(p_WE_begun=tips[0], p_WE=tips[1]).may_move is may_move
+
+
 @pytest.mark.parametrize("news", ["status_time", "image_time"])
 def test_news_of_a_time_to_come_is_no_news(news):
     assert not after(**{news: 20.0}).may_move
