@@ -151,6 +151,22 @@ def test_a_pause_in_which_calm_braking_would_take_too_long_is_a_stop(robot):
     assert len(until_at_rest(limiter, limiter.pause)) <= LONGEST_STOP / PERIOD
 
 
+@pytest.mark.parametrize(("margin", "room", "share"), [(0.005, 0.038, 0.99), (0.03, 0.04, 0.5)])
+def test_a_pause_whose_calm_braking_would_not_keep_speed_or_range_near_an_end_is_a_stop(margin, room, share):
+    limits, robot = CommandLimits(position_margin=margin), FR3_LIMITS
+    limiter = CommandLimiter(robot.position_middle, robot, limits=limits)
+    limiter.position[4] = robot.position_upper[4] - room
+    limiter.velocity[4] = share * limits.velocity * robot.velocity_range(limiter.position)[1][4]
+    limiter.velocity[6] = 0.95 * limits.acceleration * robot.acceleration[6] * LONGEST_STOP
+    limiter._stop = limiter._stop_from_here(limiter._braking)
+    assert limiter._ends_in_ranges(limiter._stop)
+    assert limiter._is_slow_enough(limiter._stop)
+    while not limiter.at_rest:
+        limiter.pause()
+        assert limiter.position[4] <= robot.position_upper[4] - limits.position_margin + 1e-9
+        assert limiter.velocity[4] <= limits.velocity * robot.velocity_range(limiter.position)[1][4]
+
+
 def test_a_stop_in_a_pause_is_as_hard_as_any_from_there_on():
     limiter = in_fast_motion(PANDA_LIMITS)
     limiter.pause()
