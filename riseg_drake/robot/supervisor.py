@@ -31,7 +31,7 @@ class SafetyParameters:
 
     status_age: float = field(default=0.1, metadata={"least": 0.02, "most": 0.3})
     """Oldest status in motion and at rest, s. So long may it move unseen: no longer than a stop may take."""
-    status_gap: float = field(default=0.1, metadata={"least": 0.03, "most": 0.4})
+    status_gap: float = field(default=0.1, metadata={"least": 0.03, "most": 0.15})
     """Largest time between the stamps of two statuses, one after the other, of a driver that was there all
     along, s; see above."""
     image_age: float = field(default=0.5, metadata={"least": 0.1, "most": 5.0})
@@ -50,7 +50,7 @@ class SafetyParameters:
     """Largest coordinates of the tip in W, m, 3; no arm reaches as far as 2 m."""
     largest_gap: float = field(default=0.1, metadata={"least": 0.01, "most": 0.3})
     """The arm may be this far from where it is told to be, and its targets from there, rad."""
-    fresh_for: float = field(default=0.3, metadata={"least": 0.05, "most": 10.0})
+    fresh_for: float = field(default=0.3, metadata={"least": 0.25, "most": 10.0})
     """A pause ends when nothing has been too old for this long, s; by then the arm is at rest."""
     displacement: float = field(default=0.01, metadata={"least": 0.001, "most": 0.1})
     """After a pause the arm must be this near to where it is told to be, rad; contact makes less."""

@@ -10,9 +10,9 @@ from drake import lcmt_panda_status
 from riseg_drake.robot.command_stream import CommandParameters, CommandStream
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.limits import PANDA_LIMITS
-from riseg_drake.robot.supervisor import Cause, Mode
+from riseg_drake.robot.supervisor import Cause, Mode, SafetyParameters
 from riseg_drake.robot.tip_geometry import TipGeometry
-from riseg_drake.stations.command_session import CommandSession
+from riseg_drake.stations.command_session import LONGEST_DEAF, CommandSession
 from riseg_drake.stations.ideal_arm import status_message
 from tests.stations.mutated_messages import (
     NEVER_NOW,
@@ -364,3 +364,8 @@ def test_mutated_messages_are_never_the_death_of_it_and_hide_no_danger(first):
     print(f"{sent} mutated messages, {sum(left_out.values())} left out; {moved} arms moved to the last", causes)
     print(dict(left_out))
     assert moved > 0
+
+
+def test_a_driver_that_was_started_anew_while_nobody_listened_is_never_taken_for_a_late_one():
+    largest_gap = SafetyParameters.__dataclass_fields__["status_gap"].metadata["most"]
+    assert LONGEST_DEAF + largest_gap < 0.5  # s that a driver takes at least
