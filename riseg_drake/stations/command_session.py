@@ -28,8 +28,8 @@ FLOODED_FOR = 1.0
 DEAF = 0.02
 """Nobody has listened for a while where two rounds are so far apart, s: LCM keeps one message of a channel."""
 LONGEST_DEAF = 0.3
-"""Not listened for longer, a driver may have been started anew, s: that takes 0.5 s and more, of which the largest
-`status_gap` leaves as much."""
+"""Where nobody has listened for longer, a driver may have been started anew, s: that takes 0.5 s and more, of
+which the largest `status_gap` leaves as much."""
 
 
 @dataclass(frozen=True)
