@@ -19,7 +19,13 @@ def run(chosen: argparse.Namespace, console: Console) -> None:
 
 
 def evaluate(chosen: argparse.Namespace, console: Console) -> None:
-    """`riseg evaluate`."""
+    """`riseg evaluate`. Raises EvaluationError for options that do not go together."""
+    from riseg_drake.app.evaluate import EvaluationError
+
+    kind, others = _evaluation_of(chosen.suite)
+    for name in others:
+        if getattr(chosen, name):
+            raise EvaluationError(f"--{name} does not go with {kind}; see riseg evaluate --help")
     if chosen.suite == "films":
         from riseg_drake.app.films import films_command
 
@@ -55,6 +61,16 @@ def evaluate(chosen: argparse.Namespace, console: Console) -> None:
         chosen.overwrite,
         console,
     )
+
+
+def _evaluation_of(suite: str | None) -> tuple[str, list[str]]:
+    """A kind of evaluation, as one would say it, and the options that only others have."""
+    scenes, own = ["objects", "ablation", "baseline", "masks"], ["scenario", "recordings"]
+    if suite is None:
+        return "an evaluation without --suite films", ["recordings"]
+    if suite == "films":
+        return "--suite films", [*scenes, "scenes", "dask"]
+    return f"--suite {suite}", scenes + own
 
 
 def hardware(chosen: argparse.Namespace, console: Console) -> None:

@@ -131,3 +131,18 @@ def test_clutter_has_nine_kinds_with_the_layouts_and_pushes_that_they_are_known_
     for model in find_models(low.objects, low.names):
         assert 0.0049 <= np.ptp(model.corners[:, 2]) <= 0.0091
     assert re.fullmatch(r"0\.785\d*", f"{kinds['view at 45 degrees'].station.observe_pitch}")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "refused"),
+    [
+        (["--suite", "clutter", "--objects", "my_models"], "--objects does not go with --suite clutter"),
+        (["--suite", "clutter", "--scenario", "my.yaml"], "--scenario does not go with --suite clutter"),
+        (["--suite", "clutter", "--ablation"], "--ablation does not go with --suite clutter"),
+        (["--suite", "films", "--masks", "a=b"], "--masks does not go with --suite films"),
+        (["--recordings", "my_films"], "--recordings does not go with an evaluation without --suite films"),
+    ],
+)
+def test_options_that_would_do_nothing_are_refused(arguments, refused, capsys):
+    assert main(["evaluate", *arguments]) == 2
+    assert refused in " ".join(capsys.readouterr().err.split())
