@@ -193,6 +193,7 @@ def work_in_processes(seed_one_dies=False):
     return work
 
 
+@pytest.mark.renders
 def test_processes_leave_the_same_as_one(tmp_path):
     for jobs in (1, 2):
         todo = tasks(tmp_path / f"jobs_{jobs}", 3)
@@ -203,6 +204,7 @@ def test_processes_leave_the_same_as_one(tmp_path):
         assert one.read_bytes() == two.read_bytes()
 
 
+@pytest.mark.renders
 def test_a_process_that_dies_takes_no_other_scene_with_it(tmp_path):
     todo = tasks(tmp_path, 3)
     outcomes = list(local_pool(2, work_in_processes(seed_one_dies=True))(todo))
@@ -215,6 +217,7 @@ def test_a_process_that_dies_takes_no_other_scene_with_it(tmp_path):
     assert not is_finished(todo[1])
 
 
+@pytest.mark.renders
 def test_processes_end_when_their_parent_is_killed(tmp_path):
     parent = subprocess.Popen(
         [sys.executable, "-c", KILLED_PARENT.format(folder=str(tmp_path))], stdin=subprocess.DEVNULL
@@ -302,6 +305,7 @@ def test_without_shared_memory_several_jobs_are_refused_in_one_line(tmp_path, mo
         list(local_pool(2)(tasks(tmp_path, 2)))
 
 
+@pytest.mark.renders
 def test_a_dask_cluster_sends_back_what_a_scene_leaves(tmp_path):
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(

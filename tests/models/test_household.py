@@ -11,11 +11,21 @@ from pydrake.multibody.tree import CalcSpatialInertia
 from riseg_drake.models.household.make_household import make_thing
 from riseg_drake.models.household.things import THINGS
 
-from riseg_drake.stations.object_models import find_models, parse_body
+from riseg_drake.stations.object_models import ObjectModel, find_models, parse_body, resolve
 
-MODELS = find_models("package://riseg_drake_models/household")
-FOLDER = MODELS[0].path.parents[1]
-named = pytest.mark.parametrize("model", MODELS, ids=lambda model: model.name)
+HOUSEHOLD = "package://riseg_drake_models/household"
+FOLDER = resolve(HOUSEHOLD)
+named = pytest.mark.parametrize("model", sorted(path.stem for path in FOLDER.glob("*/*.sdf")), indirect=True)
+
+
+@pytest.fixture(scope="module")
+def models() -> dict[str, ObjectModel]:
+    return {model.name: model for model in find_models(HOUSEHOLD)}
+
+
+@pytest.fixture
+def model(models, request) -> ObjectModel:
+    return models[request.param]
 
 
 def read_gltf(path: Path) -> tuple[np.ndarray, np.ndarray, dict]:
@@ -35,23 +45,23 @@ def height(model) -> float:
     return float(np.ptp(model.X_WB.multiply(model.corners.T)[2]))
 
 
-def test_there_are_household_things_of_every_kind():
-    names = [model.name for model in MODELS]
-    gloss = {model.name: read_gltf(model.path.with_suffix(".gltf"))[2] for model in MODELS}
-    assert len(MODELS) >= 24
+def test_there_are_household_things_of_every_kind(models):
+    heights = [height(model) for model in models.values()]
+    gloss = [read_gltf(model.path.with_suffix(".gltf"))[2] for model in models.values()]
+    assert len(models) >= 24
     for kind, least in (("carton", 8), ("can", 4), ("bottle", 4), ("mug", 2), ("bowl", 2)):
-        assert sum(name.startswith(kind) for name in names) >= least, kind
-    assert sum("lying" in name for name in names) >= 2
-    assert sum(0.005 <= height(model) <= 0.009 for model in MODELS) >= 5
-    assert sum("white" in name for name in names) >= 4
-    assert sum("black" in name for name in names) >= 4
-    assert sum(each["roughnessFactor"] < 0.35 for each in gloss.values()) >= 5
-    assert max(map(height, MODELS)) < 0.12
+        assert sum(name.startswith(kind) for name in models) >= least, kind
+    assert sum("lying" in name for name in models) >= 2
+    assert sum(0.005 <= each <= 0.009 for each in heights) >= 5
+    assert sum("white" in name for name in models) >= 4
+    assert sum("black" in name for name in models) >= 4
+    assert sum(each["roughnessFactor"] < 0.35 for each in gloss) >= 5
+    assert max(heights) < 0.12
 
 
-def test_the_cartons_for_packing_are_of_one_height():
+def test_the_cartons_for_packing_are_of_one_height(models):
     cartons = ("tea", "oats", "soap", "rice", "biscuits", "muesli", "filters")
-    assert {round(height(m), 6) for m in MODELS if m.name.removeprefix("carton_") in cartons} == {0.045}
+    assert {round(height(models[f"carton_{name}"]), 6) for name in cartons} == {0.045}
 
 
 def test_the_whole_collection_is_light_enough_to_ship():
@@ -89,8 +99,8 @@ def test_mass_properties_are_those_of_the_surface_and_collision_is_as_large(mode
 
 
 @pytest.mark.parametrize("name", ["mug_white", "cup_red", "bowl_blue"])
-def test_what_is_hollow_can_hold_something(name):
-    (model,) = find_models("package://riseg_drake_models/household", [name])
+def test_what_is_hollow_can_hold_something(models, name):
+    model = models[name]
     pieces = [
         np.array(
             [[float(x) for x in line.split()[1:]] for line in path.read_text().splitlines() if line[0] == "v"]

@@ -92,6 +92,7 @@ def is_calm(verdict):
     return verdict.acceleration_rms <= CALM_ACCELERATION and verdict.at_limit <= CALM_AT_LIMIT
 
 
+@pytest.mark.renders
 def test_in_the_mode_of_the_defaults_a_whole_run_is_calm_also_where_commands_come_unevenly(robot):
     assert is_calm(verdict_on(robot, CommandParameters(), jitter))
 
