@@ -36,7 +36,9 @@ class Public(NamedTuple):
 @cache
 def modules() -> dict[str, ast.Module]:
     """The syntax trees of all files, by their names."""
-    return {str(path.relative_to(PACKAGE)): ast.parse(path.read_text()) for path in sorted(PACKAGE.rglob("*.py"))}
+    return {
+        str(path.relative_to(PACKAGE)): ast.parse(path.read_text()) for path in sorted(PACKAGE.rglob("*.py"))
+    }
 
 
 def functions() -> Iterator[Public]:

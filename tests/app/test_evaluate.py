@@ -68,6 +68,7 @@ def scenes_run(monkeypatch):
 
     monkeypatch.setattr(scene_work, "run", run)
     monkeypatch.setattr(scene_work, "score_baselines", score_baselines)
+    monkeypatch.setattr("riseg_drake.app.evaluate.figure_png", lambda *_: b"")  # which takes longest
     return seeds
 
 

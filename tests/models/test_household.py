@@ -1,5 +1,6 @@
 import base64
 import json
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 from pydrake.geometry import SurfaceTriangle, TriangleSurfaceMesh
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import CalcSpatialInertia
+from pydrake.multibody.tree import CalcSpatialInertia, SpatialInertia
 from riseg_drake.models.household.make_household import make_thing
 from riseg_drake.models.household.things import THINGS
 
@@ -41,6 +42,12 @@ def read_gltf(path: Path) -> tuple[np.ndarray, np.ndarray, dict]:
     return np.column_stack([x, -z, y]), arrays[1].astype(int), content["materials"][0]["pbrMetallicRoughness"]
 
 
+@cache
+def inertia_of(path: Path) -> SpatialInertia:
+    """As simulated, about the body's origin."""
+    return parse_body(MultibodyPlant(0.0), path).default_spatial_inertia()
+
+
 def height(model) -> float:
     return float(np.ptp(model.X_WB.multiply(model.corners.T)[2]))
 
@@ -70,8 +77,7 @@ def test_the_whole_collection_is_light_enough_to_ship():
 
 @named
 def test_a_thing_stands_with_its_centre_of_mass_well_above_its_footprint(model):
-    body = parse_body(MultibodyPlant(0.0), model.path)
-    centre = model.X_WB.multiply(body.default_spatial_inertia().get_com())
+    centre = model.X_WB.multiply(inertia_of(model.path).get_com())
     lowest = model.X_WB.multiply(model.corners.T).T
     lowest = lowest[lowest[:, 2] < model.footprint.bottom + 1e-3][:, :2]
     hull = cv2.convexHull(lowest.astype(np.float32))
@@ -81,7 +87,7 @@ def test_a_thing_stands_with_its_centre_of_mass_well_above_its_footprint(model):
 @named
 def test_mass_properties_are_those_of_the_surface_and_collision_is_as_large(model):
     vertices, faces, _ = read_gltf(model.path.with_suffix(".gltf"))
-    inertia = parse_body(MultibodyPlant(0.0), model.path).default_spatial_inertia()
+    inertia = inertia_of(model.path)
     assert inertia.IsPhysicallyValid()
     assert 0.02 < inertia.get_mass() < 0.5
     extent = np.array([vertices.min(axis=0), vertices.max(axis=0)])
@@ -113,6 +119,7 @@ def test_what_is_hollow_can_hold_something(models, name):
             assert np.hypot(*corners[:, :2].T).min() > 0.015, "nothing in the middle, above the floor"
 
 
+@pytest.mark.renders
 @pytest.mark.parametrize("thing", THINGS[::6], ids=lambda thing: thing.name)
 def test_the_program_makes_the_same_files_again(thing, tmp_path):
     make_thing(thing, tmp_path)

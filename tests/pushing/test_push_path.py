@@ -177,7 +177,7 @@ def test_from_a_view_at_45_degrees_no_joint_leaps_and_the_arm_keeps_clear(push_f
     assert all(panda.clearance(each) >= 0.003 for each in q[::3])
 
 
-@pytest.mark.parametrize("leaning", [False, True])
+@pytest.mark.parametrize("leaning", [False, pytest.param(True, marks=pytest.mark.renders)])
 def test_reaches_pushes_all_over_the_work_area(drawn, panda, q_observe, q_leaning, leaning):
     # Pushes towards the robot are partly out of reach: the camera ahead would be in the forearm's place.
     q_from = q_leaning if leaning else q_observe

@@ -21,7 +21,7 @@ from riseg_drake.robot.supervisor import MOVE, REFLEX, Cause, Mode
 
 PERIOD = 0.005
 ROBOTS = {"panda": PANDA_LIMITS, "fr3": FR3_LIMITS}
-TRIALS = int(os.environ.get("RISEG_COMMAND_TRIALS", "40"))
+TRIALS = int(os.environ.get("RISEG_COMMAND_TRIALS", "20"))
 """Random plans for each robot in the last test; 10000 were run before this was released."""
 
 

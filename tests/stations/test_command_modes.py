@@ -20,6 +20,8 @@ from riseg_drake.robot.kinematics import PandaKinematics, observe_pose
 from riseg_drake.robot.limits import ROBOTS
 from tests.stations.driver_and_stream import DriverAndStream
 
+pytestmark = pytest.mark.renders  # whole runs of the arm
+
 INTERACTIONS = 5
 CALM_ACCELERATION, CALM_AT_LIMIT = 0.3, 1e-3
 """What is asked of the mode that is used: acceleration, share of the limit, rms; share of ticks at a limit."""
@@ -92,7 +94,6 @@ def is_calm(verdict):
     return verdict.acceleration_rms <= CALM_ACCELERATION and verdict.at_limit <= CALM_AT_LIMIT
 
 
-@pytest.mark.renders
 def test_in_the_mode_of_the_defaults_a_whole_run_is_calm_also_where_commands_come_unevenly(robot):
     assert is_calm(verdict_on(robot, CommandParameters(), jitter))
 
