@@ -127,7 +127,7 @@ def room(monkeypatch, mode):
     ("mode", "phase"),
     [
         ("velocity", ArmPhase.APPROACH),
-        ("position", ArmPhase.RETREAT),
+        pytest.param("position", ArmPhase.RETREAT, marks=pytest.mark.renders),
         pytest.param("velocity", ArmPhase.RETREAT, marks=pytest.mark.renders),
         pytest.param("position", ArmPhase.APPROACH, marks=pytest.mark.renders),
     ],

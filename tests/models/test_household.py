@@ -16,7 +16,13 @@ from riseg_drake.stations.object_models import ObjectModel, find_models, parse_b
 
 HOUSEHOLD = "package://riseg_drake_models/household"
 FOLDER = resolve(HOUSEHOLD)
-named = pytest.mark.parametrize("model", sorted(path.stem for path in FOLDER.glob("*/*.sdf")), indirect=True)
+NAMES = sorted(path.stem for path in FOLDER.glob("*/*.sdf"))
+named = pytest.mark.parametrize(
+    "model",
+    [pytest.param(name, marks=[] if k % 4 == 0 else pytest.mark.renders) for k, name in enumerate(NAMES)],
+    indirect=True,
+)
+"""Every fourth for the fast tests, the others behind the mark."""
 
 
 @pytest.fixture(scope="module")

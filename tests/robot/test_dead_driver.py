@@ -64,7 +64,7 @@ def user_stop(lab):
 ENDS = {moving: killed, pushing: reflex, holding: user_stop, paused: killed, stopped: reflex}
 """Of each phase, one that the fast tests take; the others stand behind the mark."""
 CASES = [
-    pytest.param(mode, phase, end, marks=[] if end is one else pytest.mark.renders)
+    pytest.param(mode, phase, end, marks=[] if (mode, end) == ("velocity", one) else pytest.mark.renders)
     for mode in MODES
     for phase, one in ENDS.items()
     for end in (killed, reflex, user_stop)
@@ -118,7 +118,9 @@ def test_at_the_operators_word_it_sets_out_from_where_the_arm_is_on_a_way_that_b
     assert (np.array(lab.speeds) <= 0.35 * lab.robot.velocity).all()
 
 
-@pytest.mark.parametrize("phase", [moving, pushing, paused, stopped])
+@pytest.mark.parametrize(
+    "phase", [moving, *(pytest.param(p, marks=pytest.mark.renders) for p in (pushing, paused, stopped))]
+)
 @pytest.mark.parametrize("mode", MODES)
 def test_an_arm_that_is_still_near_its_path_goes_on_with_it_at_the_operators_word(mode, phase):
     lab = dead(mode, phase, killed, turn=0.01)
