@@ -1,9 +1,8 @@
 import ast
 import re
 from collections import defaultdict
+from functools import cache
 from pathlib import Path
-
-import pytest
 
 from riseg_drake.app.diagram import make_diagram
 from riseg_drake.app.scenario import HARDWARE, load_scenario
@@ -33,15 +32,17 @@ def room(path):
     return path.relative_to(PACKAGE).parts[0]
 
 
+@cache
 def imports(path):
     """The full names of all modules that a file imports, wherever in the file it does."""
+    modules = []
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            modules += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{name(path)} imports relatively"
-            yield node.module
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+            modules += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+    return modules
 
 
 def words(cell):
@@ -73,31 +74,35 @@ def test_the_table_says_who_hears_whom_in_the_diagram():
     assert {row[0].strip("`"): words(row[1]) for row in rows} == real
 
 
-@pytest.mark.parametrize("path", FILES, ids=name)
-def test_imports_point_down_only(path):
-    own = room(path)
-    for module in imports(path):
-        package, _, rest = module.partition(".")
-        other = rest.split(".")[0]
-        if package == "riseg_drake" and other in FLOORS and other != own:
-            assert FLOORS[other] < FLOORS[own], f"{own} must not import {module}"
+def test_imports_point_down_only():
+    upwards = []
+    for path in FILES:
+        own = room(path)
+        for module in imports(path):
+            package, _, rest = module.partition(".")
+            other = rest.split(".")[0]
+            if package == "riseg_drake" and other in FLOORS and other != own and FLOORS[other] >= FLOORS[own]:
+                upwards.append(f"{name(path)} must not import {module}")
+    assert upwards == []
 
 
-@pytest.mark.parametrize("path", FILES, ids=name)
-def test_nothing_below_systems_knows_the_systems_framework(path):
-    if FLOORS[room(path)] < FLOORS["systems"]:
-        assert not [module for module in imports(path) if module.startswith("pydrake.systems")]
+def importers(begin, among=FILES):
+    """The files that import a module whose full name begins so."""
+    return [name(path) for path in among if any(module.startswith(begin) for module in imports(path))]
 
 
-@pytest.mark.parametrize("path", FILES, ids=name)
-def test_pydrake_is_imported_by_name(path):
-    assert not [module for module in imports(path) if module.startswith("pydrake.all")]
+def test_nothing_below_systems_knows_the_systems_framework():
+    below = [path for path in FILES if FLOORS[room(path)] < FLOORS["systems"]]
+    assert importers("pydrake.systems", below) == []
 
 
-@pytest.mark.parametrize("path", FILES, ids=name)
-def test_a_file_has_a_noun_for_its_name_and_a_length_that_can_be_read(path):
-    assert path.stem not in NOT_A_NOUN
-    assert len(path.read_text().splitlines()) <= LONGEST
+def test_pydrake_is_imported_by_name():
+    assert importers("pydrake.all") == []
+
+
+def test_a_file_has_a_noun_for_its_name_and_a_length_that_can_be_read():
+    assert [name(path) for path in FILES if path.stem in NOT_A_NOUN] == []
+    assert [name(path) for path in FILES if len(path.read_text().splitlines()) > LONGEST] == []
 
 
 def test_the_floor_of_geometry_stands_on_libraries_of_arrays_and_images_alone():

@@ -8,6 +8,7 @@ read.
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -32,10 +33,17 @@ class Public(NamedTuple):
     said: str
 
 
+@cache
+def modules() -> dict[str, ast.Module]:
+    """The syntax trees of all files, by their names."""
+    return {
+        str(path.relative_to(PACKAGE)): ast.parse(path.read_text()) for path in sorted(PACKAGE.rglob("*.py"))
+    }
+
+
 def functions() -> Iterator[Public]:
-    for path in sorted(PACKAGE.rglob("*.py")):
-        name = str(path.relative_to(PACKAGE))
-        for node in ast.parse(path.read_text()).body:
+    for name, module in modules().items():
+        for node in module.body:
             if isinstance(node, ast.FunctionDef) and node.name[0] != "_":
                 yield Public(f"{name}::{node.name}", node, ast.get_docstring(node) or "")
             if isinstance(node, ast.ClassDef) and node.name[0] != "_":
@@ -59,15 +67,15 @@ class Field(NamedTuple):
 
 
 def fields() -> Iterator[Field]:
-    for path in sorted(PACKAGE.rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text())):
+    for name, module in modules().items():
+        for node in ast.walk(module):
             if not isinstance(node, ast.ClassDef) or node.name[0] == "_":
                 continue
             for entry, following in zip(node.body, [*node.body[1:], None], strict=True):
                 if isinstance(entry, ast.AnnAssign) and ast.unparse(entry.target)[0] != "_":
                     own = following.value if isinstance(following, ast.Expr) else None
                     said = str(own.value) if isinstance(own, ast.Constant) else ""
-                    where = f"{path.relative_to(PACKAGE)}::{node.name}.{ast.unparse(entry.target)}"
+                    where = f"{name}::{node.name}.{ast.unparse(entry.target)}"
                     yield Field(where, entry, said, ast.get_docstring(node) or "")
 
 
@@ -93,16 +101,13 @@ def raised(function: ast.FunctionDef) -> set[str]:
     return {name for name in names if name[0].isupper()}
 
 
-FUNCTIONS, FIELDS = list(functions()), list(fields())
-
-
 def test_arrays_have_a_shape():
     silent = [
-        f.where for f in FUNCTIONS if any(map(is_array, annotations(f.node))) and not SHAPE.search(f.said)
+        f.where for f in functions() if any(map(is_array, annotations(f.node))) and not SHAPE.search(f.said)
     ]
     silent += [
         f.where
-        for f in FIELDS
+        for f in fields()
         if is_array(ast.unparse(f.node.annotation)) and not SHAPE.search(f.said + f.said_of_all)
     ]
     assert silent == []
@@ -110,7 +115,7 @@ def test_arrays_have_a_shape():
 
 def test_numbers_have_a_unit():
     silent = [
-        f.where for f in FUNCTIONS if any(map(is_number, annotations(f.node))) and not UNIT.search(f.said)
+        f.where for f in functions() if any(map(is_number, annotations(f.node))) and not UNIT.search(f.said)
     ]
     assert silent == []
 
@@ -118,14 +123,14 @@ def test_numbers_have_a_unit():
 def test_numbers_that_are_kept_are_explained():
     silent = [
         f.where
-        for f in FIELDS
+        for f in fields()
         if is_number(ast.unparse(f.node.annotation)) and not f.said and not UNIT.search(f.said_of_all)
     ]
     assert silent == []
 
 
 def test_errors_are_named():
-    silent = [(f.where, name) for f in FUNCTIONS for name in raised(f.node) if name not in f.said]
+    silent = [(f.where, name) for f in functions() for name in raised(f.node) if name not in f.said]
     assert silent == []
 
 

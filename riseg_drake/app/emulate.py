@@ -21,7 +21,7 @@ from rich.console import Console
 
 from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.output_folder import OutputError, to_json
-from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
+from riseg_drake.app.scenario import load_scenario, scenario_name
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.recording.whole_file import write_text
 from riseg_drake.stations.emulated_arm import TICK_US, EmulatedArm
@@ -31,6 +31,7 @@ from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm, receive_buffe
 from riseg_drake.stations.misbehaviour import CONTROL_CHANNEL, WORDS, WordError, parse_word
 from riseg_drake.stations.motion_judge import MotionVerdict
 from riseg_drake.stations.promptness import be_prompt
+from riseg_drake.stations.simulated import SimulatedStationConfig
 
 _GIVE_WAY = 2  # niceness of the camera's process: the status comes first, but pictures must not starve
 _PRIORITY = 10  # of the arm's process among real-time ones, where the system allows that
@@ -58,6 +59,7 @@ def emulate_command(
     if say:
         open_lcm(config.lcm).Publish(CONTROL_CHANNEL, say.encode())
         return
+    station = scenario.simulated
     if judge:
         write_verdict(judge, MotionVerdict())  # so that a file that cannot be written is noticed now
     require_graphics()
@@ -68,7 +70,7 @@ def emulate_command(
         console.print(f"[yellow]{warning}")
     with _camera_process(scenario_file, seed, faults) as camera:
         with console.status("placing the objects"):
-            arm = _place(scenario, seed)
+            arm = _place(station, config, seed)
             complaint = camera.recv()
         if complaint:
             raise ScenarioError(complaint)
@@ -94,9 +96,9 @@ def write_verdict(file: Path, verdict: MotionVerdict) -> None:
         raise OutputError(f"cannot write {file}: {error.strerror}") from None
 
 
-def _place(scenario: Scenario, seed: int) -> EmulatedArm:
+def _place(station: SimulatedStationConfig, config: EmulatorConfig, seed: int) -> EmulatedArm:
     try:
-        return EmulatedArm(scenario.simulated, scenario.emulator.driver, seed, _wall_us())
+        return EmulatedArm(station, config.driver, seed, _wall_us())
     except (ValueError, RuntimeError) as error:
         raise ScenarioError(" ".join(str(error).split())) from error
 

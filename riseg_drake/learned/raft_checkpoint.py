@@ -118,7 +118,8 @@ def torchvision_names(size: RaftSize) -> dict[str, str]:
 @cache
 def _own_shapes(size: RaftSize) -> dict[str, torch.Size]:
     """What each tensor is called here, and its shape."""
-    with torch.device("meta"):  # nothing is allocated
+    # Not on the device "meta", for which PyTorch imports for seconds; nor shall anyone's random numbers change.
+    with torch.random.fork_rng(devices=[]):
         return {key: tensor.shape for key, tensor in Raft(size).state_dict().items()}
 
 

@@ -67,9 +67,9 @@ class RobotLimits:
 
         Both are concave in size along each joint: between two positions they are largest in size in between.
         """
-        shape = np.shape(q)
         if self.slowing_down is None:
-            return np.broadcast_to(-self.velocity, shape), np.broadcast_to(self.velocity, shape)
+            fastest = np.full(np.shape(q), self.velocity)
+            return -fastest, fastest
         downwards = self.slowing_down.speed(q - self.position_lower)
         upwards = self.slowing_down.speed(self.position_upper - q)
         return -np.minimum(downwards, self.velocity), np.minimum(upwards, self.velocity)

@@ -9,6 +9,7 @@ import pytest
 from riseg_drake.app import cli
 
 
+@pytest.mark.renders
 def test_a_reader_that_has_enough_is_no_error():
     reading, writing = os.pipe()
     os.close(reading)

@@ -1,9 +1,12 @@
 """The figures of depth against errors that were put in, on a drawn scene."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
 from riseg_drake.app.depth_figures import DISPARITY, depth_figures, depth_table, draw_depth
+from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.host.images import read_image
 from riseg_drake.recording.layout import RecordedFrame
 from riseg_drake.recording.writer import RecordingWriter
@@ -16,18 +19,23 @@ ROUNDING = 1e-3 / np.sqrt(12) * DISPARITY / 0.45**2
 """What whole millimetres make of it at the table's distance, px."""
 
 
-def record(folder, smooth: float = 0.0, shift: float = 0.0, holes: float = 0.0):
+@cache
+def drawn() -> list[Frame]:
+    """Ten frames with white noise, seen by a camera that moves a little."""
     scene = DrawnScene([(0.07, 0.06, 0.03)], table=Texture(5, contrast=14), depth_noise=WHITE / DISPARITY)
+    rng, there = np.random.default_rng(2), [planar(-0.03, 0.02)]
+    return [scene.frame(number, looking_down(x=0.001 * number), there, rng)[0] for number in range(10)]
+
+
+def record(folder, smooth: float = 0.0, shift: float = 0.0, holes: float = 0.0):
     parameters = SmoothErrorParameters(disparity_std=smooth, flicker=1.0)
     with RecordingWriter(folder, CAMERA) as writer:
-        for number in range(10):
-            rng = np.random.default_rng([2, number])
-            X_WC = looking_down(x=0.001 * number)
-            frame, _ = scene.frame(number, X_WC, [planar(-0.03, 0.02)], rng)
+        for number, frame in enumerate(drawn()):
+            rng = np.random.default_rng([3, number])
             depth = frame.depth * (rng.random(frame.depth.shape) >= holes)
-            depth += depth**2 / DISPARITY * smooth_error(depth.shape, X_WC, parameters, 0, rng)
+            depth += depth**2 / DISPARITY * smooth_error(depth.shape, frame.X_WC, parameters, 0, rng)
             depth += np.where(depth > 0, shift * (number % 2), 0)
-            writer.append(RecordedFrame(number / 15, frame.color, depth.astype(np.float32), X_WC))
+            writer.append(RecordedFrame(number / 15, frame.color, depth.astype(np.float32), frame.X_WC))
     return folder
 
 

@@ -68,6 +68,7 @@ def scenes_run(monkeypatch):
 
     monkeypatch.setattr(scene_work, "run", run)
     monkeypatch.setattr(scene_work, "score_baselines", score_baselines)
+    monkeypatch.setattr("riseg_drake.app.evaluate.figure_png", lambda *_: b"")  # which takes longest
     return seeds
 
 
@@ -193,6 +194,7 @@ def work_in_processes(seed_one_dies=False):
     return work
 
 
+@pytest.mark.renders
 def test_processes_leave_the_same_as_one(tmp_path):
     for jobs in (1, 2):
         todo = tasks(tmp_path / f"jobs_{jobs}", 3)
@@ -203,6 +205,7 @@ def test_processes_leave_the_same_as_one(tmp_path):
         assert one.read_bytes() == two.read_bytes()
 
 
+@pytest.mark.renders
 def test_a_process_that_dies_takes_no_other_scene_with_it(tmp_path):
     todo = tasks(tmp_path, 3)
     outcomes = list(local_pool(2, work_in_processes(seed_one_dies=True))(todo))
@@ -215,6 +218,7 @@ def test_a_process_that_dies_takes_no_other_scene_with_it(tmp_path):
     assert not is_finished(todo[1])
 
 
+@pytest.mark.renders
 def test_processes_end_when_their_parent_is_killed(tmp_path):
     parent = subprocess.Popen(
         [sys.executable, "-c", KILLED_PARENT.format(folder=str(tmp_path))], stdin=subprocess.DEVNULL
@@ -302,6 +306,7 @@ def test_without_shared_memory_several_jobs_are_refused_in_one_line(tmp_path, mo
         list(local_pool(2)(tasks(tmp_path, 2)))
 
 
+@pytest.mark.renders
 def test_a_dask_cluster_sends_back_what_a_scene_leaves(tmp_path):
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(

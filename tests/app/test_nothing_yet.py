@@ -30,6 +30,8 @@ from riseg_drake.systems.frame_view import FrameView
 from riseg_drake.systems.mask_refiner import NO_REFINED_MASK
 from tests.segmentation.drawn_scene import CAMERA, DrawnScene, looking_down, planar
 
+pytestmark = pytest.mark.renders
+
 FUTURE = 4_000_000_000.0
 """A wall time ahead of the clock, s, so that a hardware station never has to catch up."""
 
@@ -87,7 +89,6 @@ def show(diagram, context, color, depth, time, **others):
         diagram.GetInputPort(name).FixValue(context, value)
 
 
-@pytest.mark.renders
 def test_a_simulation_with_refiner_and_browser_before_it_runs_and_when_a_push_is_under_way(
     small_scenario, tmp_path, monkeypatch
 ):
@@ -153,7 +154,6 @@ def test_a_segmentation_on_its_own_before_its_first_picture_and_after(from_joint
     walk(diagram, context)
 
 
-@pytest.mark.renders
 def test_these_are_all_the_systems_that_there_are(small_scenario, tmp_path, monkeypatch):
     sources = [path.read_text() for path in Path(riseg_drake.__file__).parent.rglob("*.py")]
     there_are = {name for source in sources for name in re.findall(r"^class (\w+)\(LeafSystem\)", source, re.M)}

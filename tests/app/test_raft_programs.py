@@ -25,6 +25,7 @@ def test_the_bench_times_both_networks_and_says_where(tmp_path, monkeypatch, cap
     assert "raft_large" in printed
 
 
+@pytest.mark.renders
 def test_training_leaves_a_checkpoint_and_reports_beside_dense_inverse_search_and_zero_flow(
     tmp_path, monkeypatch, capsys
 ):

@@ -57,6 +57,7 @@ def test_every_frame_gets_a_mask_and_a_place_in_the_video_and_a_score(recording)
     assert summary["scores_last"]["obj_gt"] == 2
 
 
+@pytest.mark.renders
 def test_without_poses_the_camera_stands_still_and_the_masks_are_the_same(recording):
     with_poses = masks(segment(recording)[0])
     (recording / "groundtruth.txt").unlink()
@@ -74,6 +75,7 @@ def test_robot_masks_of_the_recording_are_never_objects(tmp_path, pushed):
     assert not any(mask[robot].any() for mask in masks(output).values())
 
 
+@pytest.mark.renders
 def test_a_robot_of_ones_own_says_where_its_camera_is(tmp_path, pushed):
     (tmp_path / "gantry.urdf").write_text(MODEL)
     frames = [replace(frame, X_WC=None, position=np.zeros(1)) for frame in pushed]
@@ -88,7 +90,12 @@ def test_a_robot_of_ones_own_says_where_its_camera_is(tmp_path, pushed):
 
 
 @pytest.mark.parametrize(
-    ("size", "rate"), [((141, 107), 30.0), ((212, 120), 6.0), ((320, 180), 60.0)], ids=["odd", "wide", "fast"]
+    ("size", "rate"),
+    [
+        pytest.param((141, 107), 30.0, id="odd"),
+        pytest.param((212, 120), 6.0, id="wide", marks=pytest.mark.renders),
+        pytest.param((320, 180), 60.0, id="fast", marks=pytest.mark.renders),
+    ],
 )
 def test_any_size_and_rate_works(tmp_path, size, rate):
     width, height = size
@@ -147,6 +154,7 @@ def test_an_output_folder_with_other_things_is_left_alone(recording, capsys):
     assert (recording / "rgb.txt").is_file()
 
 
+@pytest.mark.renders
 def test_the_same_recording_gives_the_same_masks_again(recording):
     first = masks(segment(recording)[0])
     for name, mask in masks(segment(recording)[0]).items():

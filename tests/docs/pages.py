@@ -4,9 +4,11 @@ import re
 import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from markdown_it import MarkdownIt
+from markdown_it.token import Token
 
 CHECKOUT = Path(__file__).parents[2]
 PAGES = sorted([CHECKOUT / "README.md", CHECKOUT / "CONTRIBUTING.md", *(CHECKOUT / "docs").rglob("*.md")])
@@ -31,9 +33,15 @@ class Block:
         return f"{name(self.page)}:{self.line}"
 
 
+@cache
+def tokens(page: Path) -> list[Token]:
+    """What a page consists of."""
+    return MarkdownIt().enable("table").parse(page.read_text())
+
+
 def blocks(page: Path, language: str | None = None) -> Iterator[Block]:
     """All of a page in order, or those of one language; `` ``` `` without a word has the language ""."""
-    for token in MarkdownIt().enable("table").parse(page.read_text()):
+    for token in tokens(page):
         if token.type in ("fence", "code_block"):
             assert token.map is not None
             block = Block(page, token.map[0] + 2, token.info.strip(), token.content)
@@ -48,7 +56,7 @@ def all_blocks(language: str | None = None) -> list[Block]:
 
 def code_spans(page: Path) -> Iterator[str]:
     """What stands between backticks in running text and in tables, each on one line."""
-    for token in MarkdownIt().enable("table").parse(page.read_text()):
+    for token in tokens(page):
         for child in token.children or ():
             if child.type == "code_inline":
                 yield " ".join(child.content.split())

@@ -22,17 +22,6 @@ from tests.docs.pages import CHECKOUT, PAGES, all_blocks, blocks, code_spans, co
 LANGUAGES = {"bash", "python", "yaml", "json", "text"}
 """A block of `text` is a drawing, or what a program says; nothing is done with it here."""
 
-RENDERS = {
-    "README.md",
-    "docs/commands.md",
-    "docs/evaluation.md",
-    "docs/objects.md",
-    "docs/paper.md",
-    "docs/start.md",
-    "docs/troubleshooting.md",
-}
-"""Pages of which something draws images."""
-
 SHORT = Path("short")
 """Where scenarios lie of which only the first look is taken."""
 
@@ -189,15 +178,12 @@ def test_every_json_block_is_a_camera(block):
     camera_from_json(json.loads(block.text))
 
 
-def pages_to_execute() -> list:
-    return [
-        pytest.param(page, id=name(page), marks=[pytest.mark.renders] if name(page) in RENDERS else [])
-        for page in PAGES
-        if any(block.language in ("python", "bash") for block in blocks(page))
-    ]
+def to_execute() -> list[Path]:
+    return [page for page in PAGES if any(block.language in ("python", "bash") for block in blocks(page))]
 
 
-@pytest.mark.parametrize("page", pages_to_execute())
+@pytest.mark.renders
+@pytest.mark.parametrize("page", to_execute(), ids=name)
 def test_a_page_does_what_it_says_from_top_to_bottom(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     give(tmp_path)

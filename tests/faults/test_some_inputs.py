@@ -9,6 +9,7 @@ from tests.faults.readers import NEEDS, READERS, prepared
 INPUTS = 12
 
 
+@pytest.mark.renders
 @pytest.mark.parametrize("name", [name for name in READERS if name not in NEEDS])
 def test_mutated_input_is_read_or_refused_in_one_line(name, tmp_path, capsys):
     for case in (-1, *range(INPUTS)):

@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 from riseg_drake.app.cli import main
 from riseg_drake.host.terminal import LONGEST_LINE, one_line
 
@@ -23,6 +25,7 @@ def test_a_name_of_thousands_of_characters_is_one_line_that_can_be_read(capsys):
     assert len(capsys.readouterr().err) < LONGEST_LINE + 20
 
 
+@pytest.mark.renders
 def test_an_output_without_room_is_one_line_and_exit_code_2():
     with open("/dev/full", "w") as full:
         words = [sys.executable, "-m", "riseg_drake", "diagram"]

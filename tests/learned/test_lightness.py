@@ -11,6 +11,7 @@ THE_NETWORK_ITSELF = {f"riseg_drake.learned.{name}" for name in ("raft", "raft_c
 """What is imported only once somebody wants RAFT."""
 
 
+@pytest.mark.renders
 def test_the_whole_program_is_imported_without_torch():
     program = (
         "import importlib, pkgutil, sys\n"

@@ -1,5 +1,6 @@
 import base64
 import json
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -7,15 +8,31 @@ import numpy as np
 import pytest
 from pydrake.geometry import SurfaceTriangle, TriangleSurfaceMesh
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import CalcSpatialInertia
+from pydrake.multibody.tree import CalcSpatialInertia, SpatialInertia
 from riseg_drake.models.household.make_household import make_thing
 from riseg_drake.models.household.things import THINGS
 
-from riseg_drake.stations.object_models import find_models, parse_body
+from riseg_drake.stations.object_models import ObjectModel, find_models, parse_body, resolve
 
-MODELS = find_models("package://riseg_drake_models/household")
-FOLDER = MODELS[0].path.parents[1]
-named = pytest.mark.parametrize("model", MODELS, ids=lambda model: model.name)
+HOUSEHOLD = "package://riseg_drake_models/household"
+FOLDER = resolve(HOUSEHOLD)
+NAMES = sorted(path.stem for path in FOLDER.glob("*/*.sdf"))
+named = pytest.mark.parametrize(
+    "model",
+    [pytest.param(name, marks=[] if k % 4 == 0 else pytest.mark.renders) for k, name in enumerate(NAMES)],
+    indirect=True,
+)
+"""Every fourth for the fast tests, the others behind the mark."""
+
+
+@pytest.fixture(scope="module")
+def models() -> dict[str, ObjectModel]:
+    return {model.name: model for model in find_models(HOUSEHOLD)}
+
+
+@pytest.fixture
+def model(models, request) -> ObjectModel:
+    return models[request.param]
 
 
 def read_gltf(path: Path) -> tuple[np.ndarray, np.ndarray, dict]:
@@ -31,27 +48,33 @@ def read_gltf(path: Path) -> tuple[np.ndarray, np.ndarray, dict]:
     return np.column_stack([x, -z, y]), arrays[1].astype(int), content["materials"][0]["pbrMetallicRoughness"]
 
 
+@cache
+def inertia_of(path: Path) -> SpatialInertia:
+    """As simulated, about the body's origin."""
+    return parse_body(MultibodyPlant(0.0), path).default_spatial_inertia()
+
+
 def height(model) -> float:
     return float(np.ptp(model.X_WB.multiply(model.corners.T)[2]))
 
 
-def test_there_are_household_things_of_every_kind():
-    names = [model.name for model in MODELS]
-    gloss = {model.name: read_gltf(model.path.with_suffix(".gltf"))[2] for model in MODELS}
-    assert len(MODELS) >= 24
+def test_there_are_household_things_of_every_kind(models):
+    heights = [height(model) for model in models.values()]
+    gloss = [read_gltf(model.path.with_suffix(".gltf"))[2] for model in models.values()]
+    assert len(models) >= 24
     for kind, least in (("carton", 8), ("can", 4), ("bottle", 4), ("mug", 2), ("bowl", 2)):
-        assert sum(name.startswith(kind) for name in names) >= least, kind
-    assert sum("lying" in name for name in names) >= 2
-    assert sum(0.005 <= height(model) <= 0.009 for model in MODELS) >= 5
-    assert sum("white" in name for name in names) >= 4
-    assert sum("black" in name for name in names) >= 4
-    assert sum(each["roughnessFactor"] < 0.35 for each in gloss.values()) >= 5
-    assert max(map(height, MODELS)) < 0.12
+        assert sum(name.startswith(kind) for name in models) >= least, kind
+    assert sum("lying" in name for name in models) >= 2
+    assert sum(0.005 <= each <= 0.009 for each in heights) >= 5
+    assert sum("white" in name for name in models) >= 4
+    assert sum("black" in name for name in models) >= 4
+    assert sum(each["roughnessFactor"] < 0.35 for each in gloss) >= 5
+    assert max(heights) < 0.12
 
 
-def test_the_cartons_for_packing_are_of_one_height():
+def test_the_cartons_for_packing_are_of_one_height(models):
     cartons = ("tea", "oats", "soap", "rice", "biscuits", "muesli", "filters")
-    assert {round(height(m), 6) for m in MODELS if m.name.removeprefix("carton_") in cartons} == {0.045}
+    assert {round(height(models[f"carton_{name}"]), 6) for name in cartons} == {0.045}
 
 
 def test_the_whole_collection_is_light_enough_to_ship():
@@ -60,8 +83,7 @@ def test_the_whole_collection_is_light_enough_to_ship():
 
 @named
 def test_a_thing_stands_with_its_centre_of_mass_well_above_its_footprint(model):
-    body = parse_body(MultibodyPlant(0.0), model.path)
-    centre = model.X_WB.multiply(body.default_spatial_inertia().get_com())
+    centre = model.X_WB.multiply(inertia_of(model.path).get_com())
     lowest = model.X_WB.multiply(model.corners.T).T
     lowest = lowest[lowest[:, 2] < model.footprint.bottom + 1e-3][:, :2]
     hull = cv2.convexHull(lowest.astype(np.float32))
@@ -71,7 +93,7 @@ def test_a_thing_stands_with_its_centre_of_mass_well_above_its_footprint(model):
 @named
 def test_mass_properties_are_those_of_the_surface_and_collision_is_as_large(model):
     vertices, faces, _ = read_gltf(model.path.with_suffix(".gltf"))
-    inertia = parse_body(MultibodyPlant(0.0), model.path).default_spatial_inertia()
+    inertia = inertia_of(model.path)
     assert inertia.IsPhysicallyValid()
     assert 0.02 < inertia.get_mass() < 0.5
     extent = np.array([vertices.min(axis=0), vertices.max(axis=0)])
@@ -89,8 +111,8 @@ def test_mass_properties_are_those_of_the_surface_and_collision_is_as_large(mode
 
 
 @pytest.mark.parametrize("name", ["mug_white", "cup_red", "bowl_blue"])
-def test_what_is_hollow_can_hold_something(name):
-    (model,) = find_models("package://riseg_drake_models/household", [name])
+def test_what_is_hollow_can_hold_something(models, name):
+    model = models[name]
     pieces = [
         np.array(
             [[float(x) for x in line.split()[1:]] for line in path.read_text().splitlines() if line[0] == "v"]
@@ -103,6 +125,7 @@ def test_what_is_hollow_can_hold_something(name):
             assert np.hypot(*corners[:, :2].T).min() > 0.015, "nothing in the middle, above the floor"
 
 
+@pytest.mark.renders
 @pytest.mark.parametrize("thing", THINGS[::6], ids=lambda thing: thing.name)
 def test_the_program_makes_the_same_files_again(thing, tmp_path):
     make_thing(thing, tmp_path)

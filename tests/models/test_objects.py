@@ -1,4 +1,5 @@
 import re
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -28,18 +29,35 @@ from riseg_drake.models.objects.make_objects import make_toy
 from riseg_drake.models.objects.toys import TOYS
 
 from riseg_drake.stations.footprint import Footprint, travel
-from riseg_drake.stations.object_models import find_models, parse_body
+from riseg_drake.stations.object_models import ObjectModel, find_models, parse_body, resolve
 
-MODELS = find_models("package://riseg_drake_models/objects")
-FOLDER = MODELS[0].path.parents[1]
+OBJECTS = "package://riseg_drake_models/objects"
+FOLDER = resolve(OBJECTS)
+named = pytest.mark.parametrize("model", sorted(path.stem for path in FOLDER.glob("*/*.sdf")), indirect=True)
 
 
+@pytest.fixture(scope="module")
+def models() -> dict[str, ObjectModel]:
+    return {model.name: model for model in find_models(OBJECTS)}
+
+
+@pytest.fixture
+def model(models, request) -> ObjectModel:
+    return models[request.param]
+
+
+@cache
 def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Vertices [n, 3] and triangles [m, 3] of an OBJ file."""
     lines = [line.split() for line in path.read_text().splitlines()]
     vertices = np.array([[float(x) for x in line[1:]] for line in lines if line[0] == "v"])
     faces = np.array([[int(c.split("/")[0]) - 1 for c in line[1:]] for line in lines if line[0] == "f"])
     return vertices, faces
+
+
+def mesh(model: ObjectModel) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices [n, 3] and triangles [m, 3] of what is seen of a toy."""
+    return read_obj(model.path.with_suffix(".obj"))
 
 
 def outline_area(footprint: Footprint) -> tuple[float, float]:
@@ -51,32 +69,28 @@ def outline_area(footprint: Footprint) -> tuple[float, float]:
     return float(canvas.sum()), cv2.contourArea(cv2.convexHull(np.vstack(corners)))
 
 
-MESHES = {model.name: read_obj(model.path.with_suffix(".obj")) for model in MODELS}
-named = pytest.mark.parametrize("model", MODELS, ids=lambda model: model.name)
-
-
-def test_there_are_many_kinds_of_toys():
-    heights = {name: np.ptp(vertices[:, 2]) for name, (vertices, _) in MESHES.items()}
-    lengths = [np.ptp(model.footprint.corners(), axis=0).max() for model in MODELS]
-    filled = [area / hull for area, hull in (outline_area(model.footprint) for model in MODELS)]
-    assert len(MODELS) >= 14
-    assert sum(height < 0.016 for height in heights.values()) >= 2, "low ones"
-    assert max(heights.values()) > 0.040
-    assert max(heights.values()) < 0.051
+def test_there_are_many_kinds_of_toys(models):
+    heights = [np.ptp(mesh(model)[0][:, 2]) for model in models.values()]
+    lengths = [np.ptp(model.footprint.corners(), axis=0).max() for model in models.values()]
+    filled = [area / hull for area, hull in (outline_area(model.footprint) for model in models.values())]
+    assert len(models) >= 14
+    assert sum(height < 0.016 for height in heights) >= 2, "low ones"
+    assert max(heights) > 0.040
+    assert max(heights) < 0.051
     assert min(lengths) > 0.04
     assert max(lengths) < 0.115
     assert sum(share < 0.9 for share in filled) >= 4, "silhouettes that are not convex"
 
 
-def test_the_whole_collection_is_light_enough_to_ship():
+def test_the_whole_collection_is_light_enough_to_ship(models):
     assert sum(path.stat().st_size for path in FOLDER.rglob("*.*") if path.suffix != ".pyc") < 4e6
-    for model in MODELS:
-        assert len(MESHES[model.name][1]) < 3000
+    for model in models.values():
+        assert len(mesh(model)[1]) < 3000
         assert max(cv2.imread(str(model.path.with_suffix(".png"))).shape) <= 512
 
 
-def test_toys_look_alike_in_colour_and_varied_within():
-    images = {m.name: cv2.imread(str(m.path.with_suffix(".png"))).astype(float) for m in MODELS}
+def test_toys_look_alike_in_colour_and_varied_within(models):
+    images = {m.name: cv2.imread(str(m.path.with_suffix(".png"))).astype(float) for m in models.values()}
     spread = {name: image.std(axis=(0, 1)).mean() for name, image in images.items()}
     assert sum(value < 15 for value in spread.values()) in (1, 2), "a plain one or two"
     within = np.median(list(spread.values()))
@@ -86,13 +100,13 @@ def test_toys_look_alike_in_colour_and_varied_within():
 
 @named
 def test_mass_and_inertia_are_those_of_the_solid_inside_the_mesh(model):
-    vertices, faces = MESHES[model.name]
-    mesh = TriangleSurfaceMesh([SurfaceTriangle(*map(int, face)) for face in faces], list(vertices))
+    vertices, faces = mesh(model)
+    surface = TriangleSurfaceMesh([SurfaceTriangle(*map(int, face)) for face in faces], list(vertices))
     plant = MultibodyPlant(0.0)
     body = parse_body(plant, model.path)
     inertia = body.default_spatial_inertia()
-    volume = CalcSpatialInertia(mesh, 1.0).get_mass()
-    expected = CalcSpatialInertia(mesh, inertia.get_mass() / volume)
+    volume = CalcSpatialInertia(surface, 1.0).get_mass()
+    expected = CalcSpatialInertia(surface, inertia.get_mass() / volume)
     assert inertia.IsPhysicallyValid()
     assert 0.040 < inertia.get_mass() < 0.2
     assert 299.5 < inertia.get_mass() / volume < 900.5  # wood to solid rubber; the files are rounded
@@ -105,7 +119,7 @@ def test_mass_and_inertia_are_those_of_the_solid_inside_the_mesh(model):
 
 @named
 def test_the_mesh_is_closed(model):
-    _, faces = MESHES[model.name]
+    _, faces = mesh(model)
     edges = [tuple(edge) for k in range(3) for edge in faces[:, [k, (k + 1) % 3]]]
     assert len(set(edges)) == len(edges)
     assert {edge[::-1] for edge in edges} == set(edges)
@@ -113,7 +127,7 @@ def test_the_mesh_is_closed(model):
 
 @named
 def test_collision_pieces_follow_the_solid_and_only_feet_reach_the_table(model):
-    vertices, _ = MESHES[model.name]
+    vertices, _ = mesh(model)
     pieces = [read_obj(path)[0] for path in sorted(model.path.parent.glob("*_piece_*.obj"))]
     corners = np.vstack(pieces)
     assert corners[:, 2].min() == pytest.approx(0.0007, abs=1e-5)
@@ -145,7 +159,7 @@ class PushingBench:
 
     start, length, speed, lead = 2.0, 0.02, 0.02, 0.002
 
-    def __init__(self):
+    def __init__(self, models):
         builder = DiagramBuilder()
         plant, _ = AddMultibodyPlantSceneGraph(builder, 0.002)
         plant.set_contact_model(ContactModel.kPoint)
@@ -160,7 +174,7 @@ class PushingBench:
         self.plant, self.bodies, home = plant, [], []
         tip = Footprint((np.array([[-0.01, -0.015], [0.01, -0.015], [0.01, 0.015], [-0.01, 0.015]]),), 0.0)
         ahead = np.array([1.0, 0.0])
-        for k, model in enumerate(MODELS):
+        for k, model in enumerate(models):
             y = 0.2 * k - 1.6
             body = parse_body(plant, model.path)
             plant.SetDefaultFloatingBaseBodyPose(body, RigidTransform([0, y, 0]))
@@ -204,8 +218,8 @@ def moved(before: RigidTransform, after: RigidTransform) -> tuple[np.ndarray, fl
 
 
 @pytest.mark.renders
-def test_toys_rest_still_slide_upright_when_pushed_and_stop():
-    bench = PushingBench()
+def test_toys_rest_still_slide_upright_when_pushed_and_stop(models):
+    bench = PushingBench(models.values())
     placed = bench.poses(0.0)
     rested = bench.poses(bench.start)
     during = [bench.poses(t) for t in np.linspace(bench.start, bench.stop, 12)]
@@ -213,7 +227,7 @@ def test_toys_rest_still_slide_upright_when_pushed_and_stop():
     let_go = bench.poses(bench.stop + 0.5)  # the bar's own lag runs out
     after = bench.poses(bench.stop + 1.0)
     degree = np.pi / 180
-    for k, model in enumerate(MODELS):
+    for k, model in enumerate(models.values()):
         shift, turn, _ = moved(placed[k], rested[k])
         assert np.linalg.norm(shift) < 2e-4, f"{model.name} creeps at rest"
         assert turn < 0.2 * degree, f"{model.name} turns at rest"

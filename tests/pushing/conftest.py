@@ -60,9 +60,15 @@ class DrawnTable:
         )
 
 
+@pytest.fixture(scope="session")
+def new_table():
+    """Called, an empty table to draw on."""
+    return DrawnTable
+
+
 @pytest.fixture
-def drawn():
-    return DrawnTable()
+def drawn(new_table):
+    return new_table()
 
 
 @dataclass(frozen=True)

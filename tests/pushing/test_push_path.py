@@ -29,8 +29,9 @@ def planned(drawn, panda, q_observe):
     return push
 
 
-@pytest.fixture
-def push(drawn, panda, q_observe):
+@pytest.fixture(scope="module")
+def push(new_table, panda, q_observe):
+    drawn = new_table()
     drawn.box(0.5, 0.08, 0.05, 0.04, yaw=0.5, height=0.015).box(0.42, 0.08, 0.03, 0.06)
     return planned(drawn.box(0.56, 0.04, 0.03, 0.06), panda, q_observe)
 
@@ -148,9 +149,9 @@ def q_leaning(panda):
     return observation_posture(panda, [0.5, 0.0], 0.5, pitch=np.pi / 4)
 
 
-@pytest.fixture
-def push_from_45_degrees(drawn, panda, q_leaning):
-    return planned(drawn.box(0.5, 0.03, 0.05, 0.04, yaw=0.5), panda, q_leaning)
+@pytest.fixture(scope="module")
+def push_from_45_degrees(new_table, panda, q_leaning):
+    return planned(new_table().box(0.5, 0.03, 0.05, 0.04, yaw=0.5), panda, q_leaning)
 
 
 def test_from_a_view_at_45_degrees_the_tool_is_set_upright_on_the_way_over_things(
@@ -177,7 +178,7 @@ def test_from_a_view_at_45_degrees_no_joint_leaps_and_the_arm_keeps_clear(push_f
     assert all(panda.clearance(each) >= 0.003 for each in q[::3])
 
 
-@pytest.mark.parametrize("leaning", [False, True])
+@pytest.mark.parametrize("leaning", [False, pytest.param(True, marks=pytest.mark.renders)])
 def test_reaches_pushes_all_over_the_work_area(drawn, panda, q_observe, q_leaning, leaning):
     # Pushes towards the robot are partly out of reach: the camera ahead would be in the forearm's place.
     q_from = q_leaning if leaning else q_observe

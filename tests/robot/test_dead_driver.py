@@ -62,8 +62,14 @@ def user_stop(lab):
     reflex(lab, USER_STOPPED)
 
 
-PHASES = [moving, pushing, holding, paused, stopped]
-ENDS = [killed, reflex, user_stop]
+ENDS = {moving: killed, pushing: reflex, holding: user_stop, paused: killed, stopped: reflex}
+"""Of each phase, one that the fast tests take; the others stand behind the mark."""
+CASES = [
+    pytest.param(mode, phase, end, marks=[] if (mode, end) == ("velocity", one) else pytest.mark.renders)
+    for mode in MODES
+    for phase, one in ENDS.items()
+    for end in (killed, reflex, user_stop)
+]
 
 
 def dead(mode, phase, end, turn=BY_HAND):
@@ -81,9 +87,7 @@ def dead(mode, phase, end, turn=BY_HAND):
     return lab
 
 
-@pytest.mark.parametrize("end", ENDS)
-@pytest.mark.parametrize("phase", PHASES)
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize(("mode", "phase", "end"), CASES)
 def test_a_driver_that_is_started_anew_hears_nothing_and_the_arm_stays_where_the_hand_left_it(mode, phase, end):
     lab = dead(mode, phase, end)
     lab.start_anew()
@@ -94,9 +98,7 @@ def test_a_driver_that_is_started_anew_hears_nothing_and_the_arm_stays_where_the
     assert lab.stream.state.mode is Mode.STOPPED
 
 
-@pytest.mark.parametrize("end", ENDS)
-@pytest.mark.parametrize("phase", PHASES)
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize(("mode", "phase", "end"), CASES)
 def test_at_the_operators_word_it_sets_out_from_where_the_arm_is_on_a_way_that_begins_there(mode, phase, end):
     lab = dead(mode, phase, end)
     lab.start_anew()
@@ -117,7 +119,9 @@ def test_at_the_operators_word_it_sets_out_from_where_the_arm_is_on_a_way_that_b
     assert (np.array(lab.speeds) <= 0.35 * lab.robot.velocity).all()
 
 
-@pytest.mark.parametrize("phase", [moving, pushing, paused, stopped])
+@pytest.mark.parametrize(
+    "phase", [moving, *(pytest.param(p, marks=pytest.mark.renders) for p in (pushing, paused, stopped))]
+)
 @pytest.mark.parametrize("mode", MODES)
 def test_an_arm_that_is_still_near_its_path_goes_on_with_it_at_the_operators_word(mode, phase):
     lab = dead(mode, phase, killed, turn=0.01)

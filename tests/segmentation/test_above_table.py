@@ -160,6 +160,7 @@ def test_objects_in_rooms_as_data_sets_show_them_are_covered_and_little_else(kin
     assert hit / marked >= 0.8
 
 
+@pytest.mark.renders
 def test_an_object_that_touches_the_wall_is_found_and_the_wall_is_not() -> None:
     room = KINDS["wall, stereo"]
     frame, label, _ = draw_room(room, np.random.default_rng(4))

@@ -20,6 +20,8 @@ from riseg_drake.robot.kinematics import PandaKinematics, observe_pose
 from riseg_drake.robot.limits import ROBOTS
 from tests.stations.driver_and_stream import DriverAndStream
 
+pytestmark = pytest.mark.renders  # whole runs of the arm
+
 INTERACTIONS = 5
 CALM_ACCELERATION, CALM_AT_LIMIT = 0.3, 1e-3
 """What is asked of the mode that is used: acceleration, share of the limit, rms; share of ticks at a limit."""

@@ -30,6 +30,11 @@ NOTICED = 0.1 + 2 * PERIOD
 SWING = 0.25 * np.array([1, 0.7, -1, 0.7, 1, -1, 1])  # rad; up to 0.4 rad/s
 
 
+def slow(case):
+    """One more of the same kind, which the fast tests leave out."""
+    return pytest.param(case, marks=pytest.mark.renders)
+
+
 class Arm:
     """An arm that follows commands two periods later, with driver, camera, and a session that moves it."""
 
@@ -152,7 +157,7 @@ DANGERS = [reflex, user_stop, force, silence]
 
 
 @pytest.mark.parametrize("danger", DANGERS)
-@pytest.mark.parametrize("ahead", [3600.0, 0.05, 0.019, -3600.0])
+@pytest.mark.parametrize("ahead", [slow(3600.0), 0.05, slow(0.019), -3600.0])
 def test_a_status_stamped_at_another_time_hides_no_danger(ahead, danger):
     arm = swinging()
     arm.session.hear_status(arm.status(before=-ahead).encode())
@@ -166,7 +171,7 @@ def test_a_status_stamped_at_another_time_hides_no_danger(ahead, danger):
 
 
 @pytest.mark.parametrize("field", ["joint_position", "joint_velocity", "joint_torque_external"])
-@pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("number", [np.nan, slow(np.inf), slow(-np.inf)])
 def test_a_status_with_what_is_no_number_is_no_news(field, number):
     arm = swinging()
     arm.speaks = False
@@ -297,7 +302,7 @@ def nothing_to_unpack(arm):
     arm.session.obey("contact")
 
 
-@pytest.mark.parametrize("mode", ["velocity", "position"])
+@pytest.mark.parametrize("mode", ["velocity", slow("position")])
 @pytest.mark.parametrize(
     "fault",
     [
@@ -353,6 +358,7 @@ def trial(seed):
     return sent, moved, arm.session.report()
 
 
+@pytest.mark.renders
 @pytest.mark.parametrize("first", range(0, TRIALS, 20))
 def test_mutated_messages_are_never_the_death_of_it_and_hide_no_danger(first):
     sent, moved, causes, left_out = 0, 0, Counter(), Counter()

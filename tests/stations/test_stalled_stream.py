@@ -34,7 +34,9 @@ class Session(DriverAndStream):
 @pytest.mark.parametrize(
     ("mode", "where"), [("position", "asleep"), ("position", "at work"), ("velocity", "asleep")]
 )
-@pytest.mark.parametrize("stall", [0.012, 0.048, 0.07, 0.13])
+@pytest.mark.parametrize(
+    "stall", [*(pytest.param(s, marks=pytest.mark.renders) for s in (0.012, 0.07)), 0.048, 0.13]
+)
 def test_a_stall_of_any_length_at_full_speed_is_no_reflex_and_the_motion_goes_on(stall, where, mode):
     session = Session(mode).run(1.3)
     assert np.abs(session.robot.v_d).max() > 0.3
@@ -44,7 +46,7 @@ def test_a_stall_of_any_length_at_full_speed_is_no_reflex_and_the_motion_goes_on
 
 
 @pytest.mark.parametrize("mode", ["position", "velocity"])
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.renders)])
 def test_a_busy_computer_and_lost_commands_are_no_reflex(seed, mode):
     session = Session(mode, seed, lost=0.02)
     while session.now < 4:
