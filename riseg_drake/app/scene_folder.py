@@ -96,11 +96,6 @@ def note_death(task: SceneTask, failure: str) -> None:
     write_text(task.folder / SUMMARY, to_json(content))
 
 
-def has_begun(task: SceneTask) -> bool:
-    """Whether a process is at work on the run, or died over it."""
-    return read_json(task.folder / SUMMARY).get("state") == "running"
-
-
 def read_result(task: SceneTask, failure: str = "") -> SceneResult:
     """What the folder of a scene says; `failure` is what else is known to have gone wrong."""
     summary = read_json(task.folder / SUMMARY)

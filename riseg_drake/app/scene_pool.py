@@ -10,12 +10,13 @@ from tempfile import TemporaryDirectory
 from typing import Protocol
 
 from joblib import Parallel, cpu_count, delayed, parallel_config
+from joblib.externals.loky.backend import resource_tracker as loky_resource_tracker
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from riseg_drake.app.output import RECORDING
-from riseg_drake.app.scene_folder import SceneTask, has_begun, note_death
+from riseg_drake.app.scene_folder import SceneTask, note_death
 from riseg_drake.app.scene_work import SceneOutcome, work_on
-from riseg_drake.host.processes import end_with_parent, undisturbed
+from riseg_drake.host.processes import deaf_children, end_with_parent, undisturbed
 from riseg_drake.recording.whole_file import write_bytes
 
 Work = Callable[[SceneTask], SceneOutcome]
@@ -47,8 +48,9 @@ def local_pool(jobs: int, work: Work = work_on) -> Pool:
                     yield outcome
             except TerminatedWorkerError:
                 # One process died (of the graphics driver, or for want of memory) and took its fellows
-                # with it. Which one is found by trying again, one at a time, what they had begun.
-                for task in [task for task in left.values() if has_begun(task)]:
+                # with it. Scenes are handed out in their order, so it was at one of the first; at which, is
+                # found by trying them again, one at a time.
+                for task in list(left.values())[:jobs]:
                     del left[task.folder]
                     yield _alone(task, work)
 
@@ -96,9 +98,9 @@ def _parallel(work: Work, tasks: Sequence[SceneTask], jobs: int) -> Iterator[Sce
         warnings.filterwarnings("ignore", message="A worker stopped", category=UserWarning)
         warnings.filterwarnings("ignore", message=".* tasks which were still being", category=UserWarning)
         try:
-            with (
-                undisturbed()
-            ):  # Ctrl-C is the parent's to hear, and the processes' end is the parent's to bring
+            loky_resource_tracker.ensure_running()  # which may unblock signals, as Python's does
+            # Ctrl-C is the parent's to hear, and the processes' end is the parent's to bring.
+            with undisturbed(), deaf_children():
                 outcomes = Parallel(return_as="generator_unordered", batch_size=1)(
                     delayed(_work_below)(task, work, os.getpid()) for task in tasks
                 )

@@ -171,8 +171,11 @@ def test_a_scene_that_fails_counts_as_what_it_is_and_loses_no_other(tmp_path, sc
     assert scenes_run == [2, 3, 4, 3, 4]
 
 
-def work_in_processes(seed_one_dies=False):
-    """Work for child processes, which cannot see what a test replaces here."""
+def work_in_processes(seed_one_dies=""):
+    """Work for child processes, which cannot see what a test replaces here.
+
+    That on seed 1 may die before, in or after its run, five times at most.
+    """
     run = fake_run
 
     def work(task):
@@ -183,11 +186,19 @@ def work_in_processes(seed_one_dies=False):
         from riseg_drake.app.scenario import Scenario
         from riseg_drake.app.scene_work import SceneOutcome
 
+        def die(when):
+            deaths = task.folder.parent / "deaths"
+            if task.seed == 1 and when == seed_one_dies and len(list(deaths.glob("*"))) < 5:
+                deaths.mkdir(parents=True, exist_ok=True)
+                (deaths / str(os.getpid())).touch()
+                time.sleep(0.2)
+                os._exit(9)
+
+        die("before")
         folder = RunFolder(task.folder, task.settings, overwrite=True)
-        if seed_one_dies and task.seed == 1:
-            time.sleep(0.5)
-            os._exit(9)
+        die("in")
         run(Scenario(), task.seed, folder)
+        die("after")
         return SceneOutcome(task, "", 0.0)
 
     return work
@@ -203,9 +214,10 @@ def test_processes_leave_the_same_as_one(tmp_path):
         assert one.read_bytes() == two.read_bytes()
 
 
-def test_a_process_that_dies_takes_no_other_scene_with_it(tmp_path):
+@pytest.mark.parametrize("when", ["before", "in", "after"])
+def test_a_process_that_dies_takes_no_other_scene_with_it_and_is_not_tried_for_ever(tmp_path, when):
     todo = tasks(tmp_path, 3)
-    outcomes = list(local_pool(2, work_in_processes(seed_one_dies=True))(todo))
+    outcomes = list(local_pool(2, work_in_processes(seed_one_dies=when))(todo))
     failures = {outcome.task.seed: outcome.failure for outcome in outcomes}
     assert sorted(failures) == [0, 1, 2]
     assert not failures[0]

@@ -1,6 +1,6 @@
 """The fault trial: what was tried, and what went wrong, by kind.
 
-python -m tests.faults stops --commands run segment evaluate --signals INT KILL --count 30
+python -m tests.faults stops --commands run segment evaluate hardware --signals INT KILL --count 30
 python -m tests.faults inputs --count 20000
 python -m tests.faults machine
 
@@ -19,7 +19,7 @@ def main() -> int:
     parser.add_argument("--log", type=Path, help="keep results here, and add to those that are there")
     parts = parser.add_subparsers(dest="part", required=True)
     stops = parts.add_parser("stops", help="commands stopped at random moments")
-    stops.add_argument("--commands", nargs="+", default=["run", "segment", "evaluate"])
+    stops.add_argument("--commands", nargs="+", default=["run", "segment", "evaluate", "hardware"])
     stops.add_argument("--signals", nargs="+", default=["INT", "TERM", "KILL", "STOP"])
     stops.add_argument("--count", type=int, default=3, help="of each signal (3)")
     stops.add_argument("--place", type=Path, help="folder to work in (a new one)")

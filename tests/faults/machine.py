@@ -25,7 +25,8 @@ def try_machine(tally: Tally) -> None:
     """Try every case with every command."""
     with tempfile.TemporaryDirectory(prefix="riseg_faults_") as folder:
         place = Path(folder)
-        for name, command in stoppables(place).items():
+        commands = {name: command for name, command in stoppables(place).items() if not command.beside}
+        for name, command in commands.items():
             done = riseg(command, place / f"right_{name}")
             assert done.returncode == 0, done.stderr
         if subprocess.run(["unshare", "-rm", "true"], check=False).returncode:
@@ -34,14 +35,14 @@ def try_machine(tally: Tally) -> None:
         else:
             cases = CASES
         for case in cases:
-            for name in stoppables(place):
+            for name in commands:
                 tally.enter(f"{case}", _in_a_name_space(case, name, place), name)
 
 
 def riseg(command: Stoppable, output: Path, *more: str, **options: object) -> subprocess.CompletedProcess:
     """Run a command to its end."""
     options = {"stdout": subprocess.DEVNULL, **options}
-    words = [sys.executable, "-m", "riseg_drake", *command.arguments, "--output", str(output), *more]
+    words = [sys.executable, "-m", "riseg_drake", *command.words.split(), "--output", str(output), *more]
     return subprocess.run(words, stderr=subprocess.PIPE, text=True, check=False, **options)  # type: ignore[call-overload,no-any-return]
 
 
@@ -118,7 +119,7 @@ def _no_home(command: Stoppable, place: Path) -> list[str]:
 
 def _two_at_once(command: Stoppable, place: Path) -> list[str]:
     output = place / "out"
-    words = [sys.executable, "-m", "riseg_drake", *command.arguments, "--output", str(output)]
+    words = [sys.executable, "-m", "riseg_drake", *command.words.split(), "--output", str(output)]
     first = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     while first.poll() is None and not (output / BEGUN).exists():
         time.sleep(0.05)
