@@ -285,7 +285,16 @@ def test_overwriting_begins_an_evaluation_anew(tmp_path, scenes_run):
     assert not (tmp_path / "scene_001").exists()
 
 
-@pytest.mark.parametrize("damage", [{"steps": [{"step": 0}]}, {"steps": 3}, {"steps": [{"scores": {}}]}])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"steps": [{"step": 0}]},
+        {"steps": 3},
+        {"steps": [{"scores": {}}]},
+        {"unsettled_area_m2": "much"},
+        {"unsettled_area_m2": 10**400},
+    ],
+)
 def test_a_scene_whose_results_are_damaged_is_done_anew(tmp_path, scenes_run, damage):
     evaluate(tasks(tmp_path, 1), local_pool(1), LAST_STEP, QUIET)
     content = summary(tmp_path / "scene_000")
