@@ -63,6 +63,7 @@ def stoppables(place: Path) -> dict[str, Stoppable]:
     (place / "emulated.yaml").write_text(EMULATED.format(url=url))
     robot = yaml.safe_load(ROBOT.read_text().replace("!HardwareStationConfig", ""))
     robot["station"]["lcm"]["url"] = url
+    robot["station"]["camera"] |= {"width": 320, "rate": 5.0}
     robot["arm"]["most_interactions"] = 1
     (place / "robot.yaml").write_text(
         yaml.safe_dump(robot).replace("station:", "station: !HardwareStationConfig")

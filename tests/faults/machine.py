@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tests.faults.commands import Stoppable, stoppables
+from tests.faults.stops import UNKNOWN, run, undisturbed
 from tests.faults.tally import Tally
 
 ROOM_KB = {"run": (60, 400, 1500), "segment": (20, 100, 200), "evaluate": (60, 150, 400)}
@@ -25,17 +26,18 @@ def try_machine(tally: Tally) -> None:
     """Try every case with every command."""
     with tempfile.TemporaryDirectory(prefix="riseg_faults_") as folder:
         place = Path(folder)
-        commands = {name: command for name, command in stoppables(place).items() if not command.beside}
-        for name, command in commands.items():
-            done = riseg(command, place / f"right_{name}")
-            assert done.returncode == 0, done.stderr
+        for name, command in stoppables(place).items():
+            seconds = undisturbed(command, place / f"right_{name}")
+            (place / f"seconds_{name}").write_text(str(seconds))
         if subprocess.run(["unshare", "-rm", "true"], check=False).returncode:
             print("disks cannot be mounted here (unshare -rm), so full and read-only ones are left out")
             cases = {name: case for name, case in CASES.items() if name not in MOUNTING}
         else:
             cases = CASES
         for case in cases:
-            for name in commands:
+            for name, command in stoppables(place).items():
+                if command.beside and case not in WITH_DRIVERS:
+                    continue
                 tally.enter(f"{case}", _in_a_name_space(case, name, place), name)
 
 
@@ -132,6 +134,32 @@ def _two_at_once(command: Stoppable, place: Path) -> list[str]:
     return complaints + command.complaints(output, place / f"right_{command.name}")
 
 
+def _clock_is_set(command: Stoppable, place: Path) -> list[str]:
+    """By a second, forwards and back, for all processes at once: amid what they do, and once more later."""
+    (place / "clock").mkdir(exist_ok=True)
+    (place / "clock" / "sitecustomize.py").write_text(CLOCK)
+    seconds = float((place / f"seconds_{command.name}").read_text())
+    complaints = []
+    for step in (1.0, -1.0):
+        moments = [time.monotonic() + share * seconds for share in (0.4, 0.7)]
+        os.environ |= {"PYTHONPATH": f"{place / 'clock'}:{Path.cwd()}"}
+        os.environ |= {"CLOCK_STEP": str(step), "CLOCK_SET_AT": " ".join(map(str, moments))}
+        shutil.rmtree(place / "out", ignore_errors=True)
+        ended = run(command, place / "out", length=UNKNOWN)
+        complaints += [f"by {step:g} s: exit code {ended.code}: {ended.errors}"] * bool(ended.code)
+        complaints += command.complaints(place / "out", place / f"right_{command.name}")
+    return complaints
+
+
+CLOCK = """\
+import os, time
+wall, step = time.time, float(os.environ["CLOCK_STEP"])
+moments = [float(moment) for moment in os.environ["CLOCK_SET_AT"].split()]
+time.time = lambda: wall() + step * sum(time.monotonic() > moment for moment in moments)
+"""
+"""Python looks for this module at its start; the machine's own clock is nobody's to set."""
+
+
 CASES: dict[str, Callable[[Stoppable, Path], list[str]]] = {
     "disk full": _full_disk,
     "read-only place": _read_only,
@@ -141,7 +169,10 @@ CASES: dict[str, Callable[[Stoppable, Path], list[str]]] = {
     "somebody else's folder": _somebody_elses_folder,
     "no HOME": _no_home,
     "two at once": _two_at_once,
+    "clock set": _clock_is_set,
 }
+WITH_DRIVERS = {"clock set"}
+"""Cases for commands that have others beside them, too."""
 MOUNTING = {"disk full", "read-only place", "no shared memory"}
 
 

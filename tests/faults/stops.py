@@ -57,7 +57,7 @@ def try_stops(
     for name in names:
         command = stoppables(place)[name]
         right = place / f"right_{name}"
-        length = _undisturbed(command, right)
+        length = undisturbed(command, right)
         print(f"{name}: {length:.1f} s undisturbed", flush=True)
         for each in signals:
             for number in range(count):
@@ -71,10 +71,11 @@ def try_stops(
                     shutil.move(output, place / f"wrong_{name}_{each}_{number}_{seed}")
 
 
-def _undisturbed(command: Stoppable, right: Path) -> float:
+def undisturbed(command: Stoppable, right: Path) -> float:
+    """Run a command to its end into a new folder; returns how long it took, s."""
     if right.exists():
         shutil.rmtree(right)
-    ended = _run(command, right, length=UNKNOWN)
+    ended = run(command, right, length=UNKNOWN)
     assert ended.code == 0, ended.errors
     return ended.seconds
 
@@ -86,13 +87,13 @@ def _stop(
     while True:
         moment = EARLIEST + (length - EARLIEST) * ((share + rng.random()) % 1)
         shutil.rmtree(output, ignore_errors=True)
-        ended = _run(command, output, moment, number, length)
+        ended = run(command, output, moment, number, length)
         if ended.was_stopped:
             return moment, ended
         share, length = rng.random(), 0.9 * length
 
 
-def _run(
+def run(
     command: Stoppable, output: Path, moment: float | None = None, number: int = 0, length: float = 0.0
 ) -> Ended:
     """Run a command to its end, or send it a signal at a moment, s; undisturbed it takes `length`, s."""
@@ -232,7 +233,7 @@ def _complaints_of_words(ended: Ended, lines: int) -> list[str]:
 
 
 def _complaints_of_going_on(command: Stoppable, output: Path, right: Path, length: float) -> list[str]:
-    ended = _run(command, output, length=length)
+    ended = run(command, output, length=length)
     if ended.code:
         return [f"going on: exit code {ended.code}: {ended.errors}"]
     complaints = command.complaints(output, right)
