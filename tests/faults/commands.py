@@ -47,7 +47,7 @@ class Stoppable:
     goes_on: bool = False
     """Whether the same command, given again, must bring it to the end."""
     beside: tuple[str, ...] = ()
-    """Words of further commands, which are ended by the same signal when it has ended."""
+    """Words of further commands that wait for Ctrl-C: begun before it, ended by the same signal after it."""
 
 
 def stoppables(place: Path) -> dict[str, Stoppable]:

@@ -22,11 +22,12 @@ ROOM_KB = {"run": (60, 400, 1500), "segment": (20, 100, 200), "evaluate": (60, 1
 BEGUN = "summary.json"
 
 
-def try_machine(tally: Tally) -> None:
+def try_machine(names: list[str], tally: Tally) -> None:
     """Try every case with every command."""
     with tempfile.TemporaryDirectory(prefix="riseg_faults_") as folder:
         place = Path(folder)
-        for name, command in stoppables(place).items():
+        commands = {name: command for name, command in stoppables(place).items() if name in names}
+        for name, command in commands.items():
             seconds = undisturbed(command, place / f"right_{name}")
             (place / f"seconds_{name}").write_text(str(seconds))
         if subprocess.run(["unshare", "-rm", "true"], check=False).returncode:
@@ -35,7 +36,7 @@ def try_machine(tally: Tally) -> None:
         else:
             cases = CASES
         for case in cases:
-            for name, command in stoppables(place).items():
+            for name, command in commands.items():
                 if command.beside and case not in WITH_DRIVERS:
                     continue
                 tally.enter(f"{case}", _in_a_name_space(case, name, place), name)

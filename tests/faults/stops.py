@@ -11,6 +11,7 @@ import time
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 from riseg_drake.app.output_folder import read_json
 from tests.faults.commands import Stoppable, stoppables
@@ -97,7 +98,7 @@ def run(
     command: Stoppable, output: Path, moment: float | None = None, number: int = 0, length: float = 0.0
 ) -> Ended:
     """Run a command to its end, or send it a signal at a moment, s; undisturbed it takes `length`, s."""
-    beside = [_start(words) for words in command.beside]
+    beside = [_started(words) for words in command.beside]
     process = _start(f"{command.words} --output {output}")
     start, was_stopped = time.monotonic(), False
     try:
@@ -152,11 +153,21 @@ def _stacks(process: subprocess.Popen) -> str:
     return "\n".join(said)
 
 
-def _start(words: str) -> subprocess.Popen:
+def _started(words: str) -> subprocess.Popen:
+    """A command that waits for Ctrl-C, once it says so."""
+    with tempfile.NamedTemporaryFile() as said:
+        process = _start(words, said)
+        while b"Ctrl-C" not in Path(said.name).read_bytes():
+            assert process.poll() is None, process.communicate()[1]
+            time.sleep(0.05)
+    return process
+
+
+def _start(words: str, output: IO[bytes] | int = subprocess.DEVNULL) -> subprocess.Popen:
     return subprocess.Popen(
         [sys.executable, "-m", "riseg_drake", *words.split()],
         stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
+        stdout=output,
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
