@@ -12,6 +12,8 @@ MOST_BYTES = 2**25
 """Of one file; meshes lie beside it."""
 DEEPEST = 100
 """Elements in each other."""
+LONGEST_NAME = 1000
+"""Letters; on much longer ones the parsers' stack runs over."""
 
 
 class ModelFileError(ValueError):
@@ -31,6 +33,8 @@ def check_model(path: Path) -> None:
         depth += 1
         if depth > DEEPEST:
             raise ModelFileError("its elements are nested too deeply")
+        if len(attributes.get("name", "")) > LONGEST_NAME:
+            raise ModelFileError(f"a name in it has more than {LONGEST_NAME} letters")
 
     def end(name: str) -> None:
         nonlocal depth

@@ -20,6 +20,7 @@ BOX = """<robot name="box"><link name="box"><inertial><mass value="0.1"/>
         (BOX[:-30], "not whole XML"),
         ("<a>" * 200 + "</a>" * 200, "nested too deeply"),
         ('<!DOCTYPE a [<!ENTITY x "y">]><a>&x;</a>', "entities of its own"),
+        (BOX.replace('link name="box', 'link name="box' + 1000 * "x"), "more than 1000 letters"),
         ("", "not whole XML"),
     ],
 )
