@@ -3,8 +3,9 @@
 import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Protocol
@@ -34,9 +35,14 @@ class Pool(Protocol):
 
 
 def local_pool(jobs: int, work: Work = work_on) -> Pool:
-    """A pool of `jobs` processes, each with its share of the threads; with one job, this very process."""
+    """A pool of `jobs` processes, each with its share of the threads; with one job, this very process.
+
+    Raises PoolError where the system has no room for what they share.
+    """
     if jobs == 1:
         return lambda tasks: map(work, [replace(task, threads=cpu_count()) for task in tasks])
+    with _refusals():
+        get_context().Lock()  # joblib would go on with threads instead
 
     def outcomes(tasks: Sequence[SceneTask]) -> Iterator[SceneOutcome]:
         threads = max(1, cpu_count() // jobs)
@@ -97,7 +103,7 @@ def _parallel(work: Work, tasks: Sequence[SceneTask], jobs: int) -> Iterator[Sce
         # wonders aloud about both.
         warnings.filterwarnings("ignore", message="A worker stopped", category=UserWarning)
         warnings.filterwarnings("ignore", message=".* tasks which were still being", category=UserWarning)
-        try:
+        with _refusals():
             loky_resource_tracker.ensure_running()  # which may unblock signals, as Python's does
             # Ctrl-C is the parent's to hear, and the processes' end is the parent's to bring.
             with undisturbed(), deaf_children():
@@ -105,12 +111,19 @@ def _parallel(work: Work, tasks: Sequence[SceneTask], jobs: int) -> Iterator[Sce
                     delayed(_work_below)(task, work, os.getpid()) for task in tasks
                 )
                 stack.enter_context(closing(outcomes))
-        except OSError as error:
-            raise PoolError(
-                f"no processes for several jobs can be started ({error.strerror}; is /dev/shm usable?); "
-                "--jobs 1 needs none"
-            ) from None
         yield from outcomes
+
+
+@contextmanager
+def _refusals() -> Iterator[None]:
+    """What the system refuses in a `with` raises PoolError."""
+    try:
+        yield
+    except OSError as error:
+        raise PoolError(
+            f"no processes for several jobs can be started ({error.strerror}; is /dev/shm usable?); "
+            "--jobs 1 needs none"
+        ) from None
 
 
 def _work_below(task: SceneTask, work: Work, parent: int) -> SceneOutcome:

@@ -323,6 +323,34 @@ def test_without_shared_memory_several_jobs_are_refused_in_one_line(tmp_path, mo
         list(local_pool(2)(tasks(tmp_path, 2)))
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["evaluate", "--scenes", "2", "--jobs", "2", "--output", "out"], "is /dev/shm usable?"),
+        (["run", "nowhere.yaml", "--output", "out"], "nowhere.yaml is not there"),
+    ],
+)
+def test_where_nothing_can_be_shared_several_jobs_are_refused_and_nobody_else_minds(tmp_path, words, says):
+    command = [sys.executable, "-c", NOTHING_SHARED, *words]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert says in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+NOTHING_SHARED = """
+import _multiprocessing, errno, sys
+
+class SemLock(_multiprocessing.SemLock):
+    def __new__(cls, *_, **__):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+_multiprocessing.SemLock = SemLock
+from riseg_drake.app.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
 def test_a_dask_cluster_sends_back_what_a_scene_leaves(tmp_path):
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(

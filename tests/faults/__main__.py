@@ -27,9 +27,7 @@ def main() -> int:
     inputs = parts.add_parser("inputs", help="mutated files and messages for every reader")
     inputs.add_argument("--readers", nargs="+", help="(all)")
     inputs.add_argument("--count", type=int, default=200, help="over all readers (200)")
-    machine = parts.add_parser(
-        "machine", help="full and read-only disks, no shared memory, clocks set"
-    )
+    machine = parts.add_parser("machine", help="full and read-only disks, no shared memory, clocks set")
     for part in (stops, machine):
         part.add_argument("--commands", nargs="+", choices=COMMANDS, default=COMMANDS)
     for part in (stops, inputs):

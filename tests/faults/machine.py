@@ -17,8 +17,10 @@ from tests.faults.commands import Stoppable, stoppables
 from tests.faults.stops import UNKNOWN, run, undisturbed
 from tests.faults.tally import Tally
 
-ROOM_KB = {"run": (60, 400, 1500), "segment": (20, 100, 200), "evaluate": (60, 150, 400)}
-"""Sizes of disks that are full before the command is done: early, half way, near the end."""
+ROOM = (0.15, 0.5, 0.9)
+"""Sizes of disks that are full before the command is done, as shares of what it leaves."""
+PAGE_KB = 4
+"""A file takes whole ones of them."""
 BEGUN = "summary.json"
 
 
@@ -74,7 +76,10 @@ def _mount(place: Path, options: str) -> Path:
 
 def _full_disk(command: Stoppable, place: Path) -> list[str]:
     complaints = []
-    for size in ROOM_KB[command.name]:
+    files = [path for path in (place / f"right_{command.name}").rglob("*") if path.is_file()]
+    whole = sum(PAGE_KB * -(-path.stat().st_size // (1024 * PAGE_KB)) for path in files)
+    for share in ROOM:
+        size = round(share * whole / PAGE_KB) * PAGE_KB
         output = _mount(place / f"disk_{size}", f"size={size}k") / "out"
         complaints += _refusal(riseg(command, output), "No space left")
         complaints += command.complaints(output, place / f"right_{command.name}")
@@ -105,7 +110,7 @@ def _output_is_a_file(command: Stoppable, place: Path) -> list[str]:
 
 def _somebody_elses_folder(command: Stoppable, place: Path) -> list[str]:
     output = place / "theirs"
-    (output / "recording").mkdir(parents=True)
+    (output / "recording").mkdir(parents=True, exist_ok=True)
     (output / BEGUN).write_text('{"step": 1}')
     complaints = _refusal(riseg(command, output, "--overwrite"), "is not empty and holds no earlier")
     there = {entry.name for entry in output.iterdir()}
