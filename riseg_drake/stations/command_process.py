@@ -193,7 +193,8 @@ def stream_commands(
             connection.send(f"{type(error).__name__}: {' '.join(str(error).split())}")
         sys.exit(1)
     be_prompt(PRIORITY)
-    connection.send(READY)
+    with suppress(OSError):  # who has gone meanwhile is missed in the first round
+        connection.send(READY)
     _listen(network, session)
     session.set_out(clock())
     sent: deque[float] = deque(maxlen=1_000_000)

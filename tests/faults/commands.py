@@ -64,6 +64,7 @@ def stoppables(place: Path) -> dict[str, Stoppable]:
     robot = yaml.safe_load(ROBOT.read_text().replace("!HardwareStationConfig", ""))
     robot["station"]["lcm"]["url"] = url
     robot["station"]["camera"] |= {"width": 320, "rate": 5.0}
+    robot["station"]["command"]["safety"]["image_age"] = 5.0  # on a busy machine the arm would pause for ever
     robot["arm"]["most_interactions"] = 1
     (place / "robot.yaml").write_text(
         yaml.safe_dump(robot).replace("station:", "station: !HardwareStationConfig")
