@@ -18,7 +18,7 @@ from riseg_drake.app.diagram import Drivers, WiredDiagram, make_diagram
 from riseg_drake.app.dry_run import DryRun
 from riseg_drake.app.interactions import Listener, Progress, TruthSource, WallClock, interactions
 from riseg_drake.app.output import RECORDING, RunFolder, Step
-from riseg_drake.app.planned_speed import planned_limits
+from riseg_drake.app.planned_speed import check_limits, planned_limits
 from riseg_drake.app.run import Narrator, RunStoppedError, report, state_of
 from riseg_drake.app.run_recording import recording_of
 from riseg_drake.app.scenario import HARDWARE, Scenario, load_scenario, scenario_name
@@ -109,23 +109,6 @@ def hardware_command(
             report(steps, console)
             raise
     report(steps, console)
-
-
-def check_limits(scenario: Scenario) -> None:
-    """Raise ScenarioError unless the arm can stop in time, and paths are slower than what it may be sent."""
-    command = scenario.hardware.command
-    try:
-        command.check(scenario.hardware.panda.limits)
-    except ValueError as error:
-        raise ScenarioError(f"station.command: {error}") from None
-    limits = planned_limits(scenario)
-    for name in ("velocity", "acceleration", "jerk"):
-        planned, allowed = getattr(limits, name), getattr(command.limits, name)
-        if planned > allowed:
-            raise ScenarioError(
-                f"push.path.limits.{name} is {planned}, more than the {allowed} that "
-                f"station.command.limits.{name} lets through"
-            )
 
 
 @contextmanager

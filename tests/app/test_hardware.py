@@ -9,11 +9,11 @@ from pydrake.math import RigidTransform
 from riseg_drake.app.arm_travel import TravelError, WayBack, straight_motion
 from riseg_drake.app.cli import main
 from riseg_drake.app.diagram import make_diagram
-from riseg_drake.app.hardware import HardwareError, check_limits, wait_for_drivers
+from riseg_drake.app.hardware import HardwareError, wait_for_drivers
 from riseg_drake.app.interactions import Progress
 from riseg_drake.app.output import RunFolder
 from riseg_drake.app.output_folder import SUMMARY
-from riseg_drake.app.planned_speed import planned_limits, push_parameters
+from riseg_drake.app.planned_speed import check_limits, planned_limits, push_parameters
 from riseg_drake.app.run import RunStoppedError, state_of
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError

@@ -32,6 +32,27 @@ def test_a_model_that_cannot_be_is_one_line(tmp_path, content, says):
     assert "\n" not in str(error.value)
 
 
+BALL = """<?xml version="1.0"?><sdf version="1.7"><model name="ball"><link name="ball">
+<inertial><mass>0.1</mass></inertial><collision name="c"><geometry><sphere><radius>0.03</radius></sphere>
+</geometry></collision></link></model></sdf>"""
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (BALL.replace("<mass>0.1", "<mass>0.1 0.1"), "could not convert string to float"),
+        (BALL.replace("<?xml ", "<?: "), "not well-formed"),
+        (BALL.replace("<mass>0.1", "<mass>[[["), "Error reading element <mass>"),
+    ],
+)
+def test_what_drake_only_logs_is_one_line_too(tmp_path, content, says, capfd):
+    (tmp_path / "ball.sdf").write_text(content)
+    with pytest.raises(SceneError, match=says) as error:
+        find_models(str(tmp_path))
+    assert "\n" not in str(error.value)
+    assert capfd.readouterr().err == ""
+
+
 def test_a_pipe_in_the_place_of_a_model_hangs_nobody(tmp_path):
     os.mkfifo(tmp_path / "box.urdf")
     with pytest.raises(SceneError, match=r"box\.urdf cannot be read: is a pipe, not a file"):
