@@ -18,10 +18,11 @@ from tests.faults.commands import Stoppable, stoppables
 from tests.faults.tally import Tally
 
 PATIENCE = 60.0
-"""Within which a command that was told to stop must have ended, s, or twice its whole length: a busy machine is
-slow in all that it does."""
+"""Within which a command that was told to stop must have ended, s, or twice its whole length."""
 LONGEST = 10
 """Times its usual length, within which a command that nobody stops must have ended."""
+LEAST_USE = 0.1
+"""Of the processor in so long a time, s: less is not for want of it, but a wait for nothing."""
 UNKNOWN = 360.0
 """Taken for the usual length, s, before that is known."""
 LEFT_PATIENCE = 5.0
@@ -131,14 +132,33 @@ def _send(process: subprocess.Popen, number: int) -> None:
 
 
 def _awaited(process: subprocess.Popen, limit: float) -> tuple[int, str]:
-    """The exit code and what was said when a command has ended, with all that it has left."""
-    try:
-        _, errors = process.communicate(timeout=limit)
-        code = process.returncode
-    except subprocess.TimeoutExpired:
-        code, errors = -999, f"still there after {limit:.0f} s\n{_stacks(process)}"
+    """The exit code and what was said when a command has ended, with all that it has left.
+
+    It hangs when it has used more than `limit`, s of the processor, or when it is late and uses none.
+    """
+    wait, used = limit, 0.0
+    while True:
+        try:
+            _, errors = process.communicate(timeout=wait)
+            code = process.returncode
+            break
+        except subprocess.TimeoutExpired:
+            before, used, wait = used, _used(process.pid), PATIENCE
+            if used > limit or used - before < LEAST_USE:
+                code, errors = -999, f"still there after {used:.0f} s of its own time\n{_stacks(process)}"
+                break
     left = _left(process.pid)
     return code, errors + (f"\nleft: {left}" if left else "")
+
+
+def _used(session: int) -> float:
+    """What the living processes of a session, and those that they have seen end, have used so far, s."""
+    used = 0
+    for pid, _ in _processes(session):
+        with suppress(OSError):
+            fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+            used += sum(map(int, fields[11:15]))
+    return used / os.sysconf("SC_CLK_TCK")
 
 
 def _stacks(process: subprocess.Popen) -> str:
