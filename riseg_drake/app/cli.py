@@ -1,6 +1,7 @@
 """The command line, `riseg`: one command is run, and what is wrong is said in one line."""
 
 import os
+import warnings
 from collections.abc import Sequence
 
 from rich.console import Console
@@ -18,6 +19,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Before numpy is imported: on matrices of six by six the threads of linear algebra only wait for each
     # other, and sums that they share come out differently in their last bits.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Of a library that only evaluations with several jobs use, and these say it themselves.
+    warnings.filterwarnings("ignore", message=".*joblib will operate in serial mode", category=UserWarning)
     with stopped_by_signals(commands.__file__) as stop:
         try:
             chosen.call(chosen, Console())

@@ -23,6 +23,7 @@ from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.output_folder import OutputError, to_json
 from riseg_drake.app.scenario import load_scenario, scenario_name
 from riseg_drake.app.scenario_file import ScenarioError
+from riseg_drake.host.processes import deaf_children, end_with_parent
 from riseg_drake.recording.whole_file import write_text
 from riseg_drake.stations.emulated_arm import TICK_US, EmulatedArm
 from riseg_drake.stations.emulated_camera import EmulatedCamera
@@ -146,8 +147,9 @@ def _camera_process(scenario_file: Path | None, seed: int, faults: Sequence[str]
     """The camera's process for the time of a `with`; it first says "", or why it cannot be."""
     spawn = get_context("spawn")
     here, there = spawn.Pipe()
-    process = spawn.Process(target=_draw, args=(there, scenario_file, seed, faults), daemon=True)
-    process.start()
+    process = spawn.Process(target=_draw, args=(there, os.getpid(), scenario_file, seed, faults), daemon=True)
+    with deaf_children():  # Ctrl-C is this process's to hear
+        process.start()
     there.close()
     try:
         yield here
@@ -156,10 +158,11 @@ def _camera_process(scenario_file: Path | None, seed: int, faults: Sequence[str]
         process.join(timeout=5)
 
 
-def _draw(commands: Connection, scenario_file: Path | None, seed: int, faults: Sequence[str]) -> None:
+def _draw(
+    commands: Connection, parent: int, scenario_file: Path | None, seed: int, faults: Sequence[str]
+) -> None:
     """The camera's process: draws where everything was said to be, and falls behind rather than late."""
-    for end in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(end, signal.SIG_IGN)  # Ctrl-C is the other process's to hear
+    end_with_parent(parent)
     os.nice(_GIVE_WAY)
     scenario = load_scenario(scenario_file)
     try:

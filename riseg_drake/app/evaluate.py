@@ -75,9 +75,9 @@ def evaluate_command(
     )
     given = parse_given_masks(masks, taken=(OURS, *tasks[0].baselines))
     folder = tasks[0].folder.parent
+    pool = local_pool(jobs) if dask is None else cluster_pool(dask)
     if dask is None:
         require_graphics()
-    pool = local_pool(jobs) if dask is None else cluster_pool(dask)
     last_step = scenario.arm.most_interactions
     results = evaluate(tasks, pool, last_step, console, given, overwrite)
     _print_scores(results, last_step, console)

@@ -9,9 +9,9 @@ from pydrake.trajectories import PiecewisePolynomial
 from rich.console import Console
 
 from riseg_drake.app.arm_travel import straight_motion, travel
-from riseg_drake.app.hardware import HardwareError, check_limits, listening, wait_for_drivers
+from riseg_drake.app.hardware import HardwareError, listening, wait_for_drivers
 from riseg_drake.app.output_folder import OutputFolder
-from riseg_drake.app.planned_speed import planned_limits
+from riseg_drake.app.planned_speed import check_limits, planned_limits
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.terminal_operator import TerminalOperator

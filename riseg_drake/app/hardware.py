@@ -18,7 +18,7 @@ from riseg_drake.app.diagram import Drivers, WiredDiagram, make_diagram
 from riseg_drake.app.dry_run import DryRun
 from riseg_drake.app.interactions import Listener, Progress, TruthSource, WallClock, interactions
 from riseg_drake.app.output import RECORDING, RunFolder, Step
-from riseg_drake.app.planned_speed import planned_limits
+from riseg_drake.app.planned_speed import check_limits, planned_limits
 from riseg_drake.app.run import Narrator, RunStoppedError, report, state_of
 from riseg_drake.app.run_recording import recording_of
 from riseg_drake.app.scenario import HARDWARE, Scenario, load_scenario, scenario_name
@@ -85,39 +85,30 @@ def hardware_command(
         {"scenario": name, "seed": seed, "dry_run": dry_run},
         command="hardware",
     )
-    console.print(f"{name}, results in {folder.path}")
-    browser = StartMeshcat() if meshcat or dry_run else None
-    operator = TerminalOperator(console, yes)
-    with listening(config, replayed, truth) as (reception, truth_source):
-        with console.status("waiting for arm and camera") as status:
-            wait_for_drivers(reception, config, ready=not dry_run, say=status.update)
-        session = _Session(scenario, seed, folder, reception, truth_source, operator, console, browser)
+    progress = Progress()
+    steps: list[Step] = []
+    with folder:
         try:
-            if dry_run:
-                session.run_dry(yes, replayed)
-            else:
-                session.run(record)
+            with (
+                state_of(folder, progress, steps),
+                listening(config, replayed, truth) as (reception, truth_source),
+            ):
+                console.print(f"{name}, results in {folder.path}")
+                browser = StartMeshcat() if meshcat or dry_run else None
+                with console.status("waiting for arm and camera") as status:
+                    wait_for_drivers(reception, config, ready=not dry_run, say=status.update)
+                operator = TerminalOperator(console, yes)
+                session = _Session(
+                    scenario, seed, folder, progress, steps, reception, truth_source, operator, console, browser
+                )
+                if dry_run:
+                    session.run_dry(yes, replayed)
+                else:
+                    session.run(record)
         except RunStoppedError:
-            report(session.steps, console)
+            report(steps, console)
             raise
-    report(session.steps, console)
-
-
-def check_limits(scenario: Scenario) -> None:
-    """Raise ScenarioError unless the arm can stop in time, and paths are slower than what it may be sent."""
-    command = scenario.hardware.command
-    try:
-        command.check(scenario.hardware.panda.limits)
-    except ValueError as error:
-        raise ScenarioError(f"station.command: {error}") from None
-    limits = planned_limits(scenario)
-    for name in ("velocity", "acceleration", "jerk"):
-        planned, allowed = getattr(limits, name), getattr(command.limits, name)
-        if planned > allowed:
-            raise ScenarioError(
-                f"push.path.limits.{name} is {planned}, more than the {allowed} that "
-                f"station.command.limits.{name} lets through"
-            )
+    report(steps, console)
 
 
 @contextmanager
@@ -195,6 +186,8 @@ class _Session:
         scenario: Scenario,
         seed: int,
         folder: RunFolder,
+        progress: Progress,
+        steps: list[Step],
         reception: Reception,
         truth: TruthSource,
         operator: TerminalOperator,
@@ -205,9 +198,7 @@ class _Session:
         self._reception, self._truth, self._operator = reception, truth, operator
         self._console, self._meshcat = console, meshcat
         self._config = scenario.hardware
-        self._progress = Progress()
-        self.steps: list[Step] = []
-        """What is finished so far."""
+        self._progress, self._steps = progress, steps
         self._heard = (0, time.monotonic())
         self._stopped = False
 
@@ -216,7 +207,6 @@ class _Session:
         kinematics = PandaKinematics(self._config.panda)
         q_observe = self._observation_posture(kinematics)
         with ExitStack() as stack:
-            stack.enter_context(state_of(self._folder, self._progress, self.steps))
             commands = stack.enter_context(
                 CommandProcess(self._config.lcm, self._config.command, self._config.panda)
             )
@@ -268,17 +258,16 @@ class _Session:
         self._config.start_position = [float(q) for q in self._reception.status.position]
         operator = None if unasked else self._operator
         showing = DryRun(self._scenario, self._meshcat, operator, self._console, self._progress)
-        with state_of(self._folder, self._progress, self.steps):
-            wired = make_diagram(
-                self._scenario,
-                self._seed,
-                self._meshcat,
-                drivers=Drivers(self._reception),
-                permit=(lambda push: Permission.WAIT) if replayed else showing.permit,
-            )
-            self._interact(wired, lambda _: self._is_silent(SILENCE if replayed else PATIENCE), [])
-            if self._stopped and not replayed:
-                raise RunStoppedError(self._progress.end)
+        wired = make_diagram(
+            self._scenario,
+            self._seed,
+            self._meshcat,
+            drivers=Drivers(self._reception),
+            permit=(lambda push: Permission.WAIT) if replayed else showing.permit,
+        )
+        self._interact(wired, lambda _: self._is_silent(SILENCE if replayed else PATIENCE), [])
+        if self._stopped and not replayed:
+            raise RunStoppedError(self._progress.end)
 
     def _interact(
         self, wired: WiredDiagram, look: Callable[[Context], bool], listeners: list[Listener]
@@ -297,7 +286,7 @@ class _Session:
                 wall=wall,
             ):
                 self._folder.write_step(step)
-                self.steps.append(step)
+                self._steps.append(step)
                 narrator.tell_step(step)
         narrator.tell_end(self._progress)
 

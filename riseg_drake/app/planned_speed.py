@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from riseg_drake.app.scenario import Scenario
+from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.pushing.push_path import PlannedSpeed
 from riseg_drake.pushing.push_planning import PushPlanningParameters
 from riseg_drake.pushing.time_law import SpeedLimits
@@ -31,3 +32,20 @@ def push_parameters(scenario: Scenario) -> PushPlanningParameters:
     limits = planned_limits(scenario)
     speed = PlannedSpeed(limits.velocity, limits.acceleration, limits.jerk)
     return replace(scenario.push, path=replace(scenario.push.path, limits=speed))
+
+
+def check_limits(scenario: Scenario) -> None:
+    """Raise ScenarioError unless the arm can stop in time, and paths are slower than what it may be sent."""
+    command = scenario.hardware.command
+    try:
+        command.check(scenario.hardware.panda.limits)
+    except ValueError as error:
+        raise ScenarioError(f"station.command: {error}") from None
+    limits = planned_limits(scenario)
+    for name in ("velocity", "acceleration", "jerk"):
+        planned, allowed = getattr(limits, name), getattr(command.limits, name)
+        if planned > allowed:
+            raise ScenarioError(
+                f"push.path.limits.{name} is {planned}, more than the {allowed} that "
+                f"station.command.limits.{name} lets through"
+            )

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from riseg_drake.app.scenario import Scenario
-from riseg_drake.host.model_files import ModelFileError, check_model
+from riseg_drake.host.model_files import ModelFileError, reading_model
 from riseg_drake.host.terminal import one_line
 from riseg_drake.recording import layout
 from riseg_drake.recording.layout import RecordingError
@@ -72,8 +72,8 @@ def _kinematics(
     assert reader.joints is not None
     if robot is not None:
         try:
-            check_model(robot)
-            return OwnRobot(robot, camera_frame, reader.joints.names or [""] * number)
+            with reading_model(robot):
+                return OwnRobot(robot, camera_frame, reader.joints.names or [""] * number)
         except ModelFileError as error:
             raise OwnRobotError(f"{robot}: {error}; --robot names a URDF or SDF file") from None
         except SystemExit as error:  # one of Drake's assertions

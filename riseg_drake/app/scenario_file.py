@@ -184,9 +184,9 @@ def _without_none(schema: Any, node: yaml.Node) -> Any:
     """The schema behind `X | None`; None if nothing is left to check."""
     if typing.get_origin(schema) not in (typing.Union, types.UnionType):
         return schema
-    if node.tag.endswith(":null"):
-        return None
     rest = [choice for choice in typing.get_args(schema) if choice is not type(None)]
+    if node.tag.endswith(":null") and len(rest) < len(typing.get_args(schema)):
+        return None
     return typing.Union[tuple(rest)]  # noqa: UP007  (of a number of types that is known only here)
 
 

@@ -96,11 +96,6 @@ def note_death(task: SceneTask, failure: str) -> None:
     write_text(task.folder / SUMMARY, to_json(content))
 
 
-def has_begun(task: SceneTask) -> bool:
-    """Whether a process is at work on the run, or died over it."""
-    return read_json(task.folder / SUMMARY).get("state") == "running"
-
-
 def read_result(task: SceneTask, failure: str = "") -> SceneResult:
     """What the folder of a scene says; `failure` is what else is known to have gone wrong."""
     summary = read_json(task.folder / SUMMARY)
@@ -109,16 +104,18 @@ def read_result(task: SceneTask, failure: str = "") -> SceneResult:
     baselines = _scores_from_json(read_json(task.folder / BASELINE_FILE))
     try:
         scores, disturbances, in_motion = _figures_of_steps(summary)
+        unsettled_area = _number(summary.get("unsettled_area_m2"))
     except _DAMAGED:
         scores, disturbances, in_motion, summary = [], [], [], {}
+        unsettled_area = float("nan")
         end = f"{task.folder / SUMMARY} is damaged"
     return SceneResult(
         name=task.folder.name,
         seed=task.seed,
         failure=failure or ("" if summary.get("state") == "done" else end),
         end=end,
-        ended=summary.get("ended") or "",
-        unsettled_area_m2=_number(summary.get("unsettled_area_m2")),
+        ended=str(summary.get("ended") or ""),
+        unsettled_area_m2=unsettled_area,
         scores=scores,
         disturbances=disturbances,
         in_motion=in_motion,
@@ -133,12 +130,13 @@ def _run_is_finished(task: SceneTask) -> bool:
     same = all(summary.get(key) == task.settings[key] for key in ("scenario_sha256", "seed"))
     try:
         _figures_of_steps(summary)
+        _number(summary.get("unsettled_area_m2"))
     except _DAMAGED:
         return False
     return same and summary.get("state") == "done"
 
 
-_DAMAGED = (KeyError, TypeError, ValueError, AttributeError)
+_DAMAGED = (KeyError, TypeError, ValueError, AttributeError, OverflowError)
 """What comes of a file of results that somebody or something has changed."""
 
 

@@ -3,19 +3,21 @@
 import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Protocol
 
 from joblib import Parallel, cpu_count, delayed, parallel_config
+from joblib.externals.loky.backend import resource_tracker as loky_resource_tracker
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from riseg_drake.app.output import RECORDING
-from riseg_drake.app.scene_folder import SceneTask, has_begun, note_death
+from riseg_drake.app.scene_folder import SceneTask, note_death
 from riseg_drake.app.scene_work import SceneOutcome, work_on
-from riseg_drake.host.processes import end_with_parent, undisturbed
+from riseg_drake.host.processes import deaf_children, end_with_parent, undisturbed
 from riseg_drake.recording.whole_file import write_bytes
 
 Work = Callable[[SceneTask], SceneOutcome]
@@ -33,9 +35,14 @@ class Pool(Protocol):
 
 
 def local_pool(jobs: int, work: Work = work_on) -> Pool:
-    """A pool of `jobs` processes, each with its share of the threads; with one job, this very process."""
+    """A pool of `jobs` processes, each with its share of the threads; with one job, this very process.
+
+    Raises PoolError where the system has no room for what they share.
+    """
     if jobs == 1:
         return lambda tasks: map(work, [replace(task, threads=cpu_count()) for task in tasks])
+    with _refusals():
+        get_context().Lock()  # joblib would go on with threads instead
 
     def outcomes(tasks: Sequence[SceneTask]) -> Iterator[SceneOutcome]:
         threads = max(1, cpu_count() // jobs)
@@ -47,8 +54,9 @@ def local_pool(jobs: int, work: Work = work_on) -> Pool:
                     yield outcome
             except TerminatedWorkerError:
                 # One process died (of the graphics driver, or for want of memory) and took its fellows
-                # with it. Which one is found by trying again, one at a time, what they had begun.
-                for task in [task for task in left.values() if has_begun(task)]:
+                # with it. Scenes are handed out in their order, so it was at one of the first; at which, is
+                # found by trying them again, one at a time.
+                for task in list(left.values())[:jobs]:
                     del left[task.folder]
                     yield _alone(task, work)
 
@@ -95,20 +103,27 @@ def _parallel(work: Work, tasks: Sequence[SceneTask], jobs: int) -> Iterator[Sce
         # wonders aloud about both.
         warnings.filterwarnings("ignore", message="A worker stopped", category=UserWarning)
         warnings.filterwarnings("ignore", message=".* tasks which were still being", category=UserWarning)
-        try:
-            with (
-                undisturbed()
-            ):  # Ctrl-C is the parent's to hear, and the processes' end is the parent's to bring
+        with _refusals():
+            loky_resource_tracker.ensure_running()  # which may unblock signals, as Python's does
+            # Ctrl-C is the parent's to hear, and the processes' end is the parent's to bring.
+            with undisturbed(), deaf_children():
                 outcomes = Parallel(return_as="generator_unordered", batch_size=1)(
                     delayed(_work_below)(task, work, os.getpid()) for task in tasks
                 )
                 stack.enter_context(closing(outcomes))
-        except OSError as error:
-            raise PoolError(
-                f"no processes for several jobs can be started ({error.strerror}; is /dev/shm usable?); "
-                "--jobs 1 needs none"
-            ) from None
         yield from outcomes
+
+
+@contextmanager
+def _refusals() -> Iterator[None]:
+    """What the system refuses in a `with` raises PoolError."""
+    try:
+        yield
+    except OSError as error:
+        raise PoolError(
+            f"no processes for several jobs can be started ({error.strerror}; is /dev/shm usable?); "
+            "--jobs 1 needs none"
+        ) from None
 
 
 def _work_below(task: SceneTask, work: Work, parent: int) -> SceneOutcome:

@@ -98,11 +98,13 @@ def segment_command(request: SegmentRequest, console: Console) -> None:
     }
     output = request.output or Path("out") / f"segment_{_recording_name(request.recording)}"
     clock, result = StageClock(), SegmentResult()
-    with SegmentFolder(output, reader.rate, about, overwrite=request.overwrite) as folder:
+    with (
+        SegmentFolder(output, reader.rate, about, overwrite=request.overwrite) as folder,
+        _state_of(folder, result, clock),
+    ):
         console.print(f"{len(reader)} frames of {request.recording}, results in {output}", highlight=False)
         console.print(f"camera poses: {view.camera_poses}; robot pixels: {view.robot_pixels}", highlight=False)
-        with _state_of(folder, result, clock):
-            _segment(reader, view, Replay(scenario, view.view, seed), folder, clock, result, console)
+        _segment(reader, view, Replay(scenario, view.view, seed), folder, clock, result, console)
     _report(result, clock, output, console)
 
 

@@ -67,9 +67,9 @@ def suite_command(
     kinds = find_suite(suite)
     folder = output or Path("out") / f"suite_{Path(suite).name}_seed_{seed}"
     tasks = {kind: kind_tasks(kind, folder, scenes or SCENES, seed) for kind in kinds}
+    pool = local_pool(jobs) if dask is None else cluster_pool(dask)
     if dask is None:
         require_graphics()
-    pool = local_pool(jobs) if dask is None else cluster_pool(dask)
     results = evaluate_suite(tasks, folder, pool, console, overwrite)
     rows = [(each.name, step_means([s.scores for s in each.scenes], each.last_step)[-1]) for each in results]
     console.print("\nafter the last interaction, means over the scenes of each kind, in percent")

@@ -3,19 +3,50 @@
 These end the whole process at some damage, follow a pipe for ever, and go down a tree without an end.
 """
 
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from xml.parsers import expat
 
 from riseg_drake.host.files import FileError, read_bytes
+from riseg_drake.host.terminal import one_line
 
 MOST_BYTES = 2**25
 """Of one file; meshes lie beside it."""
 DEEPEST = 100
 """Elements in each other."""
+LONGEST_NAME = 1000
+"""Letters; on much longer ones the parsers' stack runs over."""
 
 
 class ModelFileError(ValueError):
     """Why a file is no model, in a few words without its name."""
+
+
+@contextmanager
+def reading_model(path: Path) -> Iterator[None]:
+    """For Drake's parsers to read a file in a `with`. Raises ModelFileError for what is wrong with it.
+
+    Some faults they only log, and go on with something of their own in the place of what they could not read.
+    """
+    check_model(path)
+    errors: list[str] = []
+
+    def hear(record: logging.LogRecord) -> bool:
+        if record.levelno < logging.ERROR:
+            return True
+        errors.append(one_line(record.getMessage()))
+        return False
+
+    drake = logging.getLogger("drake")
+    drake.addFilter(hear)
+    try:
+        yield
+    finally:
+        drake.removeFilter(hear)
+    if errors:
+        raise ModelFileError(errors[0])
 
 
 def check_model(path: Path) -> None:
@@ -31,6 +62,8 @@ def check_model(path: Path) -> None:
         depth += 1
         if depth > DEEPEST:
             raise ModelFileError("its elements are nested too deeply")
+        if len(attributes.get("name", "")) > LONGEST_NAME:
+            raise ModelFileError(f"a name in it has more than {LONGEST_NAME} letters")
 
     def end(name: str) -> None:
         nonlocal depth

@@ -12,6 +12,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from types import FrameType
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -82,24 +83,33 @@ def heed_no_more() -> None:
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """Stop signals wait until a `with` ends, and are not lost: KeyboardInterrupt is raised then.
-
-    Processes that are begun in it never hear Ctrl-C.
-    """
+    """Stop signals wait until a `with` ends, and are not lost: KeyboardInterrupt is raised then."""
     if threading.current_thread() is not threading.main_thread():  # only there they interrupt anything
         yield
         return
-    # The mask is what children inherit. It is not enough for this process: other threads hear the signal, too.
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     _held.depth += 1
     try:
         yield
     finally:
         _held.depth -= 1
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
         if _held.came and not _held.depth:
             _held.came = False
             raise KeyboardInterrupt
+
+
+@contextmanager
+def deaf_children() -> Iterator[None]:
+    """Processes that are begun in a `with` hear neither Ctrl-C nor `kill`, from their first moment on.
+
+    Before a child's Python has come up nothing that it does itself can help. It may unblock the signals later.
+    """
+    # At its own start this process of Python's unblocks both for good, so that has to be over.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT, signal.SIGTERM])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def end_with_parent(parent: int) -> None:

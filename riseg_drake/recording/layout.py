@@ -43,6 +43,8 @@ HEADERS = {
 
 SMALLEST, LARGEST = 32, 16384
 """Pixels on a side of an image: below that optical flow does not work, above it no camera does."""
+LEAST, MOST = 1.0, 1e6
+"""Pixels of a focal length, and units of depth in a metre: from metres to micrometres."""
 OFF_CENTRE = 0.15
 """Share of the image by which the principal point may be off its middle before a person is warned."""
 
@@ -119,8 +121,8 @@ def camera_from_json(content: Any) -> tuple[Intrinsics, float]:
                 f'"{key}" is {content[key]}, it must be a whole number from {SMALLEST} to {LARGEST}'
             )
     for key in ("fx", "fy", "depth_scale"):
-        if content[key] <= 0:
-            raise RecordingError(f'"{key}" is {content[key]}, it must be above 0')
+        if not LEAST <= content[key] <= MOST:
+            raise RecordingError(f'"{key}" is {content[key]:g}, it must be from {LEAST:g} to {MOST:g}')
     for key, size in (("cx", "width"), ("cy", "height")):
         if not 0 <= content[key] < content[size]:
             raise RecordingError(f'"{key}" is {content[key]}, outside of the {content[size]} pixels of {size}')

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.lcm import DrakeLcm
 
+from riseg_drake.host.processes import deaf_children
 from riseg_drake.robot.command_stream import CommandParameters, CommandStream
 from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import PandaKinematics
@@ -71,12 +72,8 @@ class CommandProcess:
         self._process = spawn.Process(
             target=stream_commands, args=(theirs, lcm, parameters, panda), name="riseg commands", daemon=True
         )
-        # Ctrl-C while the other process imports is for later: it ends because this one does.
-        held = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
-        try:
+        with deaf_children():  # until it knows what to do about a signal: it ends because this process does
             self._process.start()
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, held)
         theirs.close()
         self._await_start()
 
@@ -157,7 +154,7 @@ class CommandProcess:
             self._process.join(1.0)
             said = f"it ended with exit code {self._process.exitcode}"
         if said != READY:
-            self._process.terminate()
+            self._process.kill()
             raise CommandError(f"the process that sends commands did not start: {said}")
 
     def _send(self, *message: Any) -> None:
@@ -196,7 +193,8 @@ def stream_commands(
             connection.send(f"{type(error).__name__}: {' '.join(str(error).split())}")
         sys.exit(1)
     be_prompt(PRIORITY)
-    connection.send(READY)
+    with suppress(OSError):  # who has gone meanwhile is missed in the first round
+        connection.send(READY)
     _listen(network, session)
     session.set_out(clock())
     sent: deque[float] = deque(maxlen=1_000_000)

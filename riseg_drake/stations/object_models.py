@@ -15,7 +15,7 @@ from pydrake.multibody.parsing import PackageMap, Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 
-from riseg_drake.host.model_files import ModelFileError, check_model
+from riseg_drake.host.model_files import ModelFileError, reading_model
 from riseg_drake.host.terminal import one_line
 from riseg_drake.stations.contact import touches_over_area
 from riseg_drake.stations.footprint import Footprint, footprint, shape_corners
@@ -87,8 +87,8 @@ def parse_body(plant: MultibodyPlant, path: Path) -> RigidBody:
     parser.SetAutoRenaming(True)
     parser.package_map().Add("riseg_drake_models", Path(str(files("riseg_drake.models"))))
     try:
-        check_model(path)
-        instances = parser.AddModels(path)
+        with reading_model(path):
+            instances = parser.AddModels(path)
     except (ModelFileError, RuntimeError, ValueError, SystemExit) as error:  # SystemExit: Drake's assertions
         raise SceneError(f"{path} cannot be read: {one_line(error)}") from error
     bodies = [plant.get_body(index) for instance in instances for index in plant.GetBodyIndices(instance)]
@@ -157,11 +157,14 @@ def _resolve(folder_or_url: str) -> Path:
 
 
 def _masses_said(path: Path) -> list[float]:
-    """The masses, kg, in an SDF file: Drake's parser makes 1 kg of what is no mass."""
+    """The masses, kg, in an SDF file: Drake's parser makes 1 kg of what is no mass. Raises SceneError."""
     if path.suffix != ".sdf":
         return []
-    said = [element.text or "" for element in ElementTree.parse(path).iter("mass")]
-    return [float(text) for text in said if text.strip()]
+    try:
+        said = [element.text or "" for element in ElementTree.parse(path).iter("mass")]
+        return [float(text) for text in said if text.strip()]
+    except (ValueError, ElementTree.ParseError) as error:
+        raise SceneError(f"{path} cannot be read: {one_line(error)}") from None
 
 
 def _is_drawn(shape: Shape) -> bool:

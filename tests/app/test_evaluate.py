@@ -172,8 +172,11 @@ def test_a_scene_that_fails_counts_as_what_it_is_and_loses_no_other(tmp_path, sc
     assert scenes_run == [2, 3, 4, 3, 4]
 
 
-def work_in_processes(seed_one_dies=False):
-    """Work for child processes, which cannot see what a test replaces here."""
+def work_in_processes(seed_one_dies=""):
+    """Work for child processes, which cannot see what a test replaces here.
+
+    That on seed 1 may die before, in or after its run, five times at most.
+    """
     run = fake_run
 
     def work(task):
@@ -184,11 +187,19 @@ def work_in_processes(seed_one_dies=False):
         from riseg_drake.app.scenario import Scenario
         from riseg_drake.app.scene_work import SceneOutcome
 
+        def die(when):
+            deaths = task.folder.parent / "deaths"
+            if task.seed == 1 and when == seed_one_dies and len(list(deaths.glob("*"))) < 5:
+                deaths.mkdir(parents=True, exist_ok=True)
+                (deaths / str(os.getpid())).touch()
+                time.sleep(0.2)
+                os._exit(9)
+
+        die("before")
         folder = RunFolder(task.folder, task.settings, overwrite=True)
-        if seed_one_dies and task.seed == 1:
-            time.sleep(0.5)
-            os._exit(9)
+        die("in")
         run(Scenario(), task.seed, folder)
+        die("after")
         return SceneOutcome(task, "", 0.0)
 
     return work
@@ -206,9 +217,10 @@ def test_processes_leave_the_same_as_one(tmp_path):
 
 
 @pytest.mark.renders
-def test_a_process_that_dies_takes_no_other_scene_with_it(tmp_path):
+@pytest.mark.parametrize("when", ["before", "in", "after"])
+def test_a_process_that_dies_takes_no_other_scene_with_it_and_is_not_tried_for_ever(tmp_path, when):
     todo = tasks(tmp_path, 3)
-    outcomes = list(local_pool(2, work_in_processes(seed_one_dies=True))(todo))
+    outcomes = list(local_pool(2, work_in_processes(seed_one_dies=when))(todo))
     failures = {outcome.task.seed: outcome.failure for outcome in outcomes}
     assert sorted(failures) == [0, 1, 2]
     assert not failures[0]
@@ -277,7 +289,16 @@ def test_overwriting_begins_an_evaluation_anew(tmp_path, scenes_run):
     assert not (tmp_path / "scene_001").exists()
 
 
-@pytest.mark.parametrize("damage", [{"steps": [{"step": 0}]}, {"steps": 3}, {"steps": [{"scores": {}}]}])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"steps": [{"step": 0}]},
+        {"steps": 3},
+        {"steps": [{"scores": {}}]},
+        {"unsettled_area_m2": "much"},
+        {"unsettled_area_m2": 10**400},
+    ],
+)
 def test_a_scene_whose_results_are_damaged_is_done_anew(tmp_path, scenes_run, damage):
     evaluate(tasks(tmp_path, 1), local_pool(1), LAST_STEP, QUIET)
     content = summary(tmp_path / "scene_000")
@@ -304,6 +325,35 @@ def test_without_shared_memory_several_jobs_are_refused_in_one_line(tmp_path, mo
     monkeypatch.setattr("riseg_drake.app.scene_pool.Parallel", no_semaphores)
     with pytest.raises(PoolError, match=r"is /dev/shm usable.*--jobs 1 needs none"):
         list(local_pool(2)(tasks(tmp_path, 2)))
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["evaluate", "--scenes", "2", "--jobs", "2", "--output", "out"], "is /dev/shm usable?"),
+        (["run", "nowhere.yaml", "--output", "out"], "nowhere.yaml is not there"),
+    ],
+)
+def test_where_nothing_can_be_shared_several_jobs_are_refused_and_nobody_else_minds(tmp_path, words, says):
+    command = [sys.executable, "-c", NOTHING_SHARED, *words]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert says in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+NOTHING_SHARED = """
+import _multiprocessing, errno, sys
+
+class SemLock(_multiprocessing.SemLock):
+    def __new__(cls, *_, **__):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+_multiprocessing.SemLock = SemLock
+from riseg_drake.app.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
 
 
 @pytest.mark.renders

@@ -9,11 +9,11 @@ from pydrake.math import RigidTransform
 from riseg_drake.app.arm_travel import TravelError, WayBack, straight_motion
 from riseg_drake.app.cli import main
 from riseg_drake.app.diagram import make_diagram
-from riseg_drake.app.hardware import HardwareError, check_limits, wait_for_drivers
+from riseg_drake.app.hardware import HardwareError, wait_for_drivers
 from riseg_drake.app.interactions import Progress
 from riseg_drake.app.output import RunFolder
 from riseg_drake.app.output_folder import SUMMARY
-from riseg_drake.app.planned_speed import planned_limits, push_parameters
+from riseg_drake.app.planned_speed import check_limits, planned_limits, push_parameters
 from riseg_drake.app.run import RunStoppedError, state_of
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
@@ -307,3 +307,21 @@ def test_the_truth_behind_a_picture_is_found_by_its_stamp_in_a_replayed_log_too(
 )
 def test_gaps_are_judged_as_a_driver_would(gaps, verdict):
     assert is_even(gaps, 0.005) is verdict
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "state"),
+    [(KeyboardInterrupt(), 130, "interrupted"), (HardwareError("nothing came"), 2, "failed")],
+)
+def test_a_session_that_ends_while_it_waits_for_the_drivers_says_so_in_its_summary(
+    error, code, state, tmp_path, monkeypatch, capsys
+):
+    def wait(*_, **__):
+        raise error
+
+    monkeypatch.setattr("riseg_drake.app.hardware.wait_for_drivers", wait)
+    scenario = tmp_path / "robot.yaml"
+    scenario.write_text('station: !HardwareStationConfig {lcm: {url: "memq://"}}\n')
+    assert main(["hardware", str(scenario), "--yes", "--output", str(tmp_path / "out")]) == code
+    assert json.loads((tmp_path / "out" / SUMMARY).read_text())["state"] == state
+    assert capsys.readouterr().err.count("\n") == 1

@@ -13,6 +13,11 @@ class Camera:
 
 
 @dataclass
+class Sensor:
+    gain: float = 1.0
+
+
+@dataclass
 class Scene:
     camera: Camera = field(default_factory=Camera)
     objects: int = 4
@@ -20,6 +25,7 @@ class Scene:
     centre: list[float] = field(default_factory=lambda: [0.5, 0.0])
     limit: float | None = None
     method: str = field(default="fast", metadata={"choices": ("fast", "careful")})
+    eye: Camera | Sensor = field(default_factory=Camera)
 
 
 def parse(text):
@@ -52,6 +58,7 @@ def test_an_empty_file_is_all_defaults(text):
         ("centre: 3", "scene.yaml: line 1: centre must be a list, such as [1, 2], not '3'"),
         ("centre: [1, x]", "scene.yaml: line 1: centre[1] must be a number, not 'x'"),
         ("camera: 3", "scene.yaml: line 1: camera must be a block of keys (rate, noise), not '3'"),
+        ("eye:", "scene.yaml: line 1: eye must be a block of keys (rate, noise), not ''"),
         ("method: quick", "scene.yaml: line 1: method must be one of fast, careful, not 'quick'"),
         ("- 1", "scene.yaml: line 1: the scenario must be a block of keys"),
         ("a: [1", "scene.yaml: line 1: not YAML"),

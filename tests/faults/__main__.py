@@ -1,6 +1,6 @@
 """The fault trial: what was tried, and what went wrong, by kind.
 
-python -m tests.faults stops --commands run segment evaluate --signals INT KILL --count 30
+python -m tests.faults stops --commands run segment evaluate hardware --signals INT KILL --count 30
 python -m tests.faults inputs --count 20000
 python -m tests.faults machine
 
@@ -12,6 +12,8 @@ from pathlib import Path
 
 from tests.faults.tally import Tally
 
+COMMANDS = ["run", "segment", "evaluate", "hardware"]
+
 
 def main() -> int:
     """Run a part; 0 if nothing was wrong."""
@@ -19,14 +21,15 @@ def main() -> int:
     parser.add_argument("--log", type=Path, help="keep results here, and add to those that are there")
     parts = parser.add_subparsers(dest="part", required=True)
     stops = parts.add_parser("stops", help="commands stopped at random moments")
-    stops.add_argument("--commands", nargs="+", default=["run", "segment", "evaluate"])
     stops.add_argument("--signals", nargs="+", default=["INT", "TERM", "KILL", "STOP"])
     stops.add_argument("--count", type=int, default=3, help="of each signal (3)")
     stops.add_argument("--place", type=Path, help="folder to work in (a new one)")
     inputs = parts.add_parser("inputs", help="mutated files and messages for every reader")
     inputs.add_argument("--readers", nargs="+", help="(all)")
     inputs.add_argument("--count", type=int, default=200, help="over all readers (200)")
-    parts.add_parser("machine", help="full and read-only disks, no shared memory, two commands at once")
+    machine = parts.add_parser("machine", help="full and read-only disks, no shared memory, clocks set")
+    for part in (stops, machine):
+        part.add_argument("--commands", nargs="+", choices=COMMANDS, default=COMMANDS)
     for part in (stops, inputs):
         part.add_argument("--seed", type=int, default=0, help="draws moments and mutations (0)")
     chosen = parser.parse_args()
@@ -42,7 +45,7 @@ def main() -> int:
     else:
         from tests.faults.machine import try_machine
 
-        try_machine(tally)
+        try_machine(chosen.commands, tally)
     print(tally.table())
     return 1 if any(tally.wrong.values()) else 0
 

@@ -5,12 +5,14 @@ as `riseg emulate` beside `riseg hardware`.
 """
 
 import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
+import yaml
 
 from riseg_drake.recording.layout import RecordingError
 from riseg_drake.recording.reader import RecordingReader
@@ -18,12 +20,19 @@ from tests.recording.made_recordings import SMALL, drawn_frames, write
 
 SCENARIO = """\
 station:
-  scene: {count_min: 2, count_max: 2}
-  camera: {width: 160, height: 120, fx: 154.1, fy: 153.9, cx: 75.3, cy: 58.2, rate: 10}
+  scene: {count_min: 1, count_max: 1}
+  camera: {width: 160, height: 120, fx: 154.1, fy: 153.9, cx: 75.3, cy: 58.2, rate: 5}
 arm: {most_interactions: 1}
 """
+"""The smallest that has every phase of a run."""
+EMULATED = """\
+station: {{scene: {{count_min: 1, count_max: 1}}}}
+emulator: {{lcm: {{url: "{url}"}}, driver: {{control_mode: velocity}}, rate: 5}}
+"""
+"""The same for the drivers; a camera's driver has pictures of one size."""
+ROBOT = Path(__file__).parents[2] / "diagrams" / "hardware.yaml"
 FRAMES = 60
-STATES = {"running", "interrupted", "failed", "done"}
+STATES = {"running", "interrupted", "failed", "stopped", "done"}
 
 
 @dataclass(frozen=True)
@@ -31,14 +40,14 @@ class Stoppable:
     """A command to be stopped."""
 
     name: str
-    arguments: tuple[str, ...]
-    """Of riseg, without --output."""
+    words: str
+    """After `riseg`, without --output."""
     complaints: Callable[[Path, Path], list[str]]
     """What is wrong with an output folder, given that of an undisturbed command."""
     goes_on: bool = False
     """Whether the same command, given again, must bring it to the end."""
-    beside: tuple[tuple[str, ...], ...] = ()
-    """Arguments of further commands."""
+    beside: tuple[str, ...] = ()
+    """Words of further commands that wait for Ctrl-C: begun before it, ended by the same signal after it."""
 
 
 def stoppables(place: Path) -> dict[str, Stoppable]:
@@ -49,38 +58,39 @@ def stoppables(place: Path) -> dict[str, Stoppable]:
     if not recording.exists():
         write(recording, drawn_frames(FRAMES), SMALL)
     (place / "short.yaml").write_text(f"{SCENARIO}longest: 3.0\n")
-    evaluate = (
-        "evaluate",
-        "--scenario",
-        str(place / "short.yaml"),
-        "--seed",
-        "1",
-        "--scenes",
-        "2",
-        "--jobs",
-        "2",
+    evaluate = f"evaluate --scenario {place / 'short.yaml'} --seed 1 --scenes 3 --jobs 2"
+    url = f"udpm://239.255.76.67:{20000 + os.getpid() % 20000}?ttl=0&recv_buf_size=4194304"
+    (place / "emulated.yaml").write_text(EMULATED.format(url=url))
+    robot = yaml.safe_load(ROBOT.read_text().replace("!HardwareStationConfig", ""))
+    robot["station"]["lcm"]["url"] = url
+    robot["station"]["camera"] |= {"width": 320, "rate": 5.0}
+    robot["station"]["command"]["safety"]["image_age"] = 5.0  # on a busy machine the arm would pause for ever
+    robot["arm"]["most_interactions"] = 1
+    (place / "robot.yaml").write_text(
+        yaml.safe_dump(robot).replace("station:", "station: !HardwareStationConfig")
     )
+    emulate = f"emulate {place / 'emulated.yaml'} --seed 1"
     return {
         each.name: each
         for each in (
-            Stoppable("run", ("run", str(scenario), "--seed", "1", "--record"), wrong_run),
-            Stoppable("segment", ("segment", str(recording)), wrong_segmentation),
+            Stoppable("run", f"run {scenario} --seed 1 --record", wrong_run),
+            Stoppable("segment", f"segment {recording}", wrong_segmentation),
             Stoppable("evaluate", evaluate, wrong_evaluation, goes_on=True),
+            Stoppable(
+                "hardware", f"hardware {place / 'robot.yaml'} --yes --record", wrong_session, beside=(emulate,)
+            ),
         )
     }
 
 
 def wrong_run(folder: Path, right: Path) -> list[str]:
     """Listed steps are there, whole, and those of the undisturbed run; recorded frames are whole."""
-    summary, complaints = _summary(folder)
-    listed = [entry["step"] for entry in summary.get("steps", [])]
-    if listed != list(range(len(listed))):
-        complaints.append(f"the steps {listed} are listed")
-    for i in listed:
-        complaints += _unequal_images(folder / f"step_{i}", right / f"step_{i}")
-    if (folder / "recording" / "rgb.txt").exists():
-        complaints += _wrong_recording(folder / "recording")
-    return complaints
+    return _wrong_steps(folder, lambda name: _unequal_images(folder / name, right / name))
+
+
+def wrong_session(folder: Path, right: Path) -> list[str]:
+    """The same, but at wall time no session sees the pictures of another one."""
+    return _wrong_steps(folder, lambda name: _unreadable_images(folder / name, right / "step_0"))
 
 
 def wrong_segmentation(folder: Path, right: Path) -> list[str]:
@@ -118,6 +128,23 @@ def _summary(folder: Path) -> tuple[dict, list[str]]:
     except ValueError as error:
         return {}, [f"{path}: {error}"]
     return summary, [] if summary.get("state") in STATES else [f"{path}: state {summary.get('state')}"]
+
+
+def _wrong_steps(folder: Path, wrong_images: Callable[[str], list[str]]) -> list[str]:
+    summary, complaints = _summary(folder)
+    listed = [entry["step"] for entry in summary.get("steps", [])]
+    if listed != list(range(len(listed))):
+        complaints.append(f"the steps {listed} are listed")
+    for i in listed:
+        complaints += wrong_images(f"step_{i}")
+    if (folder / "recording" / "rgb.txt").exists():
+        complaints += _wrong_recording(folder / "recording")
+    return complaints
+
+
+def _unreadable_images(folder: Path, right: Path) -> list[str]:
+    names = [path.name for path in sorted(right.glob("*.png"))]
+    return [f"{folder / name} is no image" for name in names if cv2.imread(str(folder / name)) is None]
 
 
 def _unequal_images(folder: Path, right: Path, all_there: bool = True) -> list[str]:

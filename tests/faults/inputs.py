@@ -24,6 +24,8 @@ MOST_MEMORY = 1500
 GROWTH = 4
 """Times the memory with the right input."""
 TOLD_EVERY = 500
+MOST_INPUTS = 500
+"""Of one process: what it keeps of each is not the memory of the last."""
 
 
 def try_inputs(names: list[str] | None, count: int, seed: int, tally: Tally) -> None:
@@ -43,7 +45,7 @@ def try_inputs(names: list[str] | None, count: int, seed: int, tally: Tally) -> 
 def _try_reader(name: str, number: int, seed: int, tally: Tally, place: Path) -> None:
     done, right, most, slowest = 0, 0, 0, 0.0
     while done < number:
-        for case in _cases(name, seed, done, number, place):
+        for case in _cases(name, seed, done, min(done + MOST_INPUTS, number), place):
             if case["case"] < 0:  # the right input
                 right = right or case["memory_mb"]
                 assert case["code"] == 0, f"{name}: the right input is refused: {case['error']}"
@@ -64,12 +66,14 @@ def _try_reader(name: str, number: int, seed: int, tally: Tally, place: Path) ->
 
 def _cases(name: str, seed: int, first: int, end: int, place: Path) -> Iterator[dict]:
     """What a process says of its inputs, until it hangs or dies; then it is ended, and that is said, too."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "tests.faults.reading", name, *map(str, (seed, first, end)), str(place)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
+    errors = place / "errors.txt"
+    with errors.open("w") as said:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "tests.faults.reading", name, *map(str, (seed, first, end)), str(place)],
+            stdout=subprocess.PIPE,
+            stderr=said,
+            start_new_session=True,
+        )
     assert process.stdout is not None
     now, what, begun, watch = first, "", False, _Watch(process.pid)
     rest = b""
@@ -86,7 +90,7 @@ def _cases(name: str, seed: int, first: int, end: int, place: Path) -> Iterator[
                 if begun:
                     yield _broken(now, what, f"the process ended with {code}")
                 elif code:
-                    raise RuntimeError(f"{name}: the process that reads ended with {code}")
+                    raise RuntimeError(f"{name}: before an input was read: {errors.read_text()[-700:]}")
                 return
             *lines, rest = (rest + read).split(b"\n")
             for line in lines:

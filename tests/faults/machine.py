@@ -14,34 +14,40 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tests.faults.commands import Stoppable, stoppables
+from tests.faults.stops import UNKNOWN, run, undisturbed
 from tests.faults.tally import Tally
 
-ROOM_KB = {"run": (60, 400, 1500), "segment": (20, 100, 200), "evaluate": (60, 150, 400)}
-"""Sizes of disks that are full before the command is done: early, half way, near the end."""
+ROOM = (0.15, 0.5, 0.9)
+"""Sizes of disks that are full before the command is done, as shares of what it leaves."""
+PAGE_KB = 4
+"""A file takes whole ones of them."""
 BEGUN = "summary.json"
 
 
-def try_machine(tally: Tally) -> None:
+def try_machine(names: list[str], tally: Tally) -> None:
     """Try every case with every command."""
     with tempfile.TemporaryDirectory(prefix="riseg_faults_") as folder:
         place = Path(folder)
-        for name, command in stoppables(place).items():
-            done = riseg(command, place / f"right_{name}")
-            assert done.returncode == 0, done.stderr
+        commands = {name: command for name, command in stoppables(place).items() if name in names}
+        for name, command in commands.items():
+            seconds = undisturbed(command, place / f"right_{name}")
+            (place / f"seconds_{name}").write_text(str(seconds))
         if subprocess.run(["unshare", "-rm", "true"], check=False).returncode:
             print("disks cannot be mounted here (unshare -rm), so full and read-only ones are left out")
             cases = {name: case for name, case in CASES.items() if name not in MOUNTING}
         else:
             cases = CASES
         for case in cases:
-            for name in stoppables(place):
+            for name, command in commands.items():
+                if command.beside and case not in WITH_DRIVERS:
+                    continue
                 tally.enter(f"{case}", _in_a_name_space(case, name, place), name)
 
 
 def riseg(command: Stoppable, output: Path, *more: str, **options: object) -> subprocess.CompletedProcess:
     """Run a command to its end."""
     options = {"stdout": subprocess.DEVNULL, **options}
-    words = [sys.executable, "-m", "riseg_drake", *command.arguments, "--output", str(output), *more]
+    words = [sys.executable, "-m", "riseg_drake", *command.words.split(), "--output", str(output), *more]
     return subprocess.run(words, stderr=subprocess.PIPE, text=True, check=False, **options)  # type: ignore[call-overload,no-any-return]
 
 
@@ -70,7 +76,10 @@ def _mount(place: Path, options: str) -> Path:
 
 def _full_disk(command: Stoppable, place: Path) -> list[str]:
     complaints = []
-    for size in ROOM_KB[command.name]:
+    files = [path for path in (place / f"right_{command.name}").rglob("*") if path.is_file()]
+    whole = sum(PAGE_KB * -(-path.stat().st_size // (1024 * PAGE_KB)) for path in files)
+    for share in ROOM:
+        size = round(share * whole / PAGE_KB) * PAGE_KB
         output = _mount(place / f"disk_{size}", f"size={size}k") / "out"
         complaints += _refusal(riseg(command, output), "No space left")
         complaints += command.complaints(output, place / f"right_{command.name}")
@@ -101,7 +110,7 @@ def _output_is_a_file(command: Stoppable, place: Path) -> list[str]:
 
 def _somebody_elses_folder(command: Stoppable, place: Path) -> list[str]:
     output = place / "theirs"
-    (output / "recording").mkdir(parents=True)
+    (output / "recording").mkdir(parents=True, exist_ok=True)
     (output / BEGUN).write_text('{"step": 1}')
     complaints = _refusal(riseg(command, output, "--overwrite"), "is not empty and holds no earlier")
     there = {entry.name for entry in output.iterdir()}
@@ -118,7 +127,7 @@ def _no_home(command: Stoppable, place: Path) -> list[str]:
 
 def _two_at_once(command: Stoppable, place: Path) -> list[str]:
     output = place / "out"
-    words = [sys.executable, "-m", "riseg_drake", *command.arguments, "--output", str(output)]
+    words = [sys.executable, "-m", "riseg_drake", *command.words.split(), "--output", str(output)]
     first = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     while first.poll() is None and not (output / BEGUN).exists():
         time.sleep(0.05)
@@ -131,6 +140,32 @@ def _two_at_once(command: Stoppable, place: Path) -> list[str]:
     return complaints + command.complaints(output, place / f"right_{command.name}")
 
 
+def _clock_is_set(command: Stoppable, place: Path) -> list[str]:
+    """By a second, forwards and back, for all processes at once: amid what they do, and once more later."""
+    (place / "clock").mkdir(exist_ok=True)
+    (place / "clock" / "sitecustomize.py").write_text(CLOCK)
+    seconds = float((place / f"seconds_{command.name}").read_text())
+    complaints = []
+    for step in (1.0, -1.0):
+        moments = [time.monotonic() + share * seconds for share in (0.4, 0.7)]
+        os.environ |= {"PYTHONPATH": f"{place / 'clock'}:{Path.cwd()}"}
+        os.environ |= {"CLOCK_STEP": str(step), "CLOCK_SET_AT": " ".join(map(str, moments))}
+        shutil.rmtree(place / "out", ignore_errors=True)
+        ended = run(command, place / "out", length=UNKNOWN)
+        complaints += [f"by {step:g} s: exit code {ended.code}: {ended.errors}"] * bool(ended.code)
+        complaints += command.complaints(place / "out", place / f"right_{command.name}")
+    return complaints
+
+
+CLOCK = """\
+import os, time
+wall, step = time.time, float(os.environ["CLOCK_STEP"])
+moments = [float(moment) for moment in os.environ["CLOCK_SET_AT"].split()]
+time.time = lambda: wall() + step * sum(time.monotonic() > moment for moment in moments)
+"""
+"""Python looks for this module at its start; the machine's own clock is nobody's to set."""
+
+
 CASES: dict[str, Callable[[Stoppable, Path], list[str]]] = {
     "disk full": _full_disk,
     "read-only place": _read_only,
@@ -140,7 +175,10 @@ CASES: dict[str, Callable[[Stoppable, Path], list[str]]] = {
     "somebody else's folder": _somebody_elses_folder,
     "no HOME": _no_home,
     "two at once": _two_at_once,
+    "clock set": _clock_is_set,
 }
+WITH_DRIVERS = {"clock set"}
+"""Cases for commands that have others beside them, too."""
 MOUNTING = {"disk full", "read-only place", "no shared memory"}
 
 

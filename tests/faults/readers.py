@@ -19,6 +19,7 @@ from riseg_drake.app.output_folder import OutputFolder
 from riseg_drake.app.recorded_view import recorded_view
 from riseg_drake.app.scenario import Scenario, load_scenario
 from riseg_drake.app.scene_folder import is_finished, read_result
+from riseg_drake.evaluation.report import report_text
 from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.recording.reader import RecordingReader
@@ -265,7 +266,10 @@ def _results(place: Path) -> None:
     steps = [
         {"step": i, "scores": figures, "pushed": "a", "motions": {"a": motion}, "time_s": i} for i in (0, 1)
     ]
+    for step in steps:
+        step["in_motion"] = {"frames": 3, "overlap_f": 0.5, "at_rest_f": None}
     summary = {"command": "run", **task.settings, "state": "done", "end": "x", "steps": steps}
+    summary |= {"ended": "no_path", "unsettled_area_m2": 0.002}
     (task.folder / "summary.json").write_text(json.dumps(summary))
     (task.folder / "baselines.json").write_text(json.dumps({name: [figures] * 2 for name in task.baselines}))
     (task.folder / "ablation.json").write_text(json.dumps({"scores": {}, "failures": {}}))
@@ -274,7 +278,7 @@ def _results(place: Path) -> None:
 def _read_results(place: Path) -> None:
     task = scene_tasks(Scenario(), "simulation", place / "evaluation", 1, 0, ablation=True)[0]
     is_finished(task)
-    read_result(task)
+    report_text([read_result(task)], {}, last_step=1)
     OutputFolder(place / "run", "run", r"step_\d+", {}, overwrite=True).close()
 
 

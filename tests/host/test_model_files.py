@@ -20,6 +20,7 @@ BOX = """<robot name="box"><link name="box"><inertial><mass value="0.1"/>
         (BOX[:-30], "not whole XML"),
         ("<a>" * 200 + "</a>" * 200, "nested too deeply"),
         ('<!DOCTYPE a [<!ENTITY x "y">]><a>&x;</a>', "entities of its own"),
+        (BOX.replace('link name="box', 'link name="box' + 1000 * "x"), "more than 1000 letters"),
         ("", "not whole XML"),
     ],
 )
@@ -29,6 +30,27 @@ def test_a_model_that_cannot_be_is_one_line(tmp_path, content, says):
         find_models(str(tmp_path))
     assert "box.urdf" in str(error.value)
     assert "\n" not in str(error.value)
+
+
+BALL = """<?xml version="1.0"?><sdf version="1.7"><model name="ball"><link name="ball">
+<inertial><mass>0.1</mass></inertial><collision name="c"><geometry><sphere><radius>0.03</radius></sphere>
+</geometry></collision></link></model></sdf>"""
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (BALL.replace("<mass>0.1", "<mass>0.1 0.1"), "could not convert string to float"),
+        (BALL.replace("<?xml ", "<?: "), "not well-formed"),
+        (BALL.replace("<mass>0.1", "<mass>[[["), "Error reading element <mass>"),
+    ],
+)
+def test_what_drake_only_logs_is_one_line_too(tmp_path, content, says, capfd):
+    (tmp_path / "ball.sdf").write_text(content)
+    with pytest.raises(SceneError, match=says) as error:
+        find_models(str(tmp_path))
+    assert "\n" not in str(error.value)
+    assert capfd.readouterr().err == ""
 
 
 def test_a_pipe_in_the_place_of_a_model_hangs_nobody(tmp_path):

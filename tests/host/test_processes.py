@@ -39,6 +39,19 @@ if os.fork() == 0:
 time.sleep(600)
 """
 
+DEAF_CHILD = """
+import os, signal
+from multiprocessing import get_context
+from riseg_drake.host.processes import deaf_children
+
+look = "import os, signal; os._exit(len({2, 15} & signal.pthread_sigmask(signal.SIG_BLOCK, ())))"
+child = get_context("spawn").Process(target=exec, args=(look,))
+with deaf_children():
+    child.start()
+child.join()
+print(child.exitcode, len(signal.pthread_sigmask(signal.SIG_BLOCK, ())))
+"""
+
 
 @pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
 def test_ctrl_c_while_drake_is_imported_is_one_line_and_its_own_exit_code(name, code):
@@ -101,6 +114,11 @@ def test_what_is_ignored_stays_ignored():
             os.kill(os.getpid(), signal.SIGHUP)
     finally:
         signal.signal(signal.SIGHUP, before)
+
+
+def test_a_child_begins_deaf_to_both_signals_and_its_parent_is_not():
+    done = subprocess.run([sys.executable, "-c", DEAF_CHILD], capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("2 0\n", "")
 
 
 def test_a_child_ends_with_its_parent_however_that_ends():

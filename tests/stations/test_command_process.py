@@ -1,5 +1,6 @@
 """The process itself, on a network of its own within this machine."""
 
+import multiprocessing
 import os
 import signal
 import time
@@ -13,7 +14,7 @@ from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.supervisor import Cause, Mode
 from riseg_drake.stations import command_process
-from riseg_drake.stations.command_process import CommandError, CommandProcess
+from riseg_drake.stations.command_process import CommandError, CommandProcess, stream_commands
 from riseg_drake.stations.command_session import FINAL_COMMANDS, command_message
 from riseg_drake.stations.ideal_arm import IdealArm
 from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm
@@ -107,6 +108,17 @@ def ctrl_c(session):
 
 def die(session):
     session.commands._connection.close()
+
+
+@pytest.mark.renders
+def test_a_process_that_is_alone_before_it_is_ready_ends_as_one_that_is_left_alone():
+    here, there = multiprocessing.Pipe()
+    here.close()
+    arguments = there, LcmConfig(url="memq://"), CommandParameters(), PandaDescription()
+    process = multiprocessing.get_context("spawn").Process(target=stream_commands, args=arguments)
+    process.start()
+    process.join(60)
+    assert process.exitcode == 0
 
 
 @pytest.mark.renders
