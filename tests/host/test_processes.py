@@ -23,7 +23,6 @@ class Pydrake:
             except KeyboardInterrupt:  # as modules of C++ do
                 raise ImportError("initialization failed")
 
-signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in the background of a shell
 sys.meta_path.insert(0, Pydrake())
 from riseg_drake.__main__ import program
 sys.argv = ["riseg", "run"]
