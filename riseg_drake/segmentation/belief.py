@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
+from riseg_drake.geometry.se3 import inverse
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.border_prior import BorderPriorParameters, border_prior
 from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe
@@ -173,6 +174,24 @@ def next_belief(
         next_id=bodies.next_id,
         part=partition(new, prior + evidence, parameters.partition),
     )
+
+
+def rebased(then: Bodies, now: Bodies, old: Keyframe, following: Belief) -> Bodies:
+    """How bodies had moved `then`, since the keyframe of `now`, which follows the `old` one: backwards, mostly.
+
+    `then` and `now` are told since the old keyframe.
+    """
+    X_NO = inverse(following.keyframe.frame.X_WC) @ old.frame.X_WC
+    motions, motion = [np.eye(4)], np.zeros(following.keyframe.count, np.intp)
+    for a in np.unique(following.body[following.body > 0]):
+        mine = now.body == a
+        if not mine.any():
+            continue
+        k = np.bincount(then.motion[mine], old.area[mine]).argmax()
+        motion[following.body == a] = len(motions)
+        since = then.motions_K[k] @ inverse(now.motions_K[now.motion[mine][0]])
+        motions.append(X_NO @ since @ inverse(X_NO))
+    return Bodies(following.body, motion, np.array(motions), following.next_id)
 
 
 def _carried_evidence(

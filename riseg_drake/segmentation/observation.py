@@ -31,6 +31,8 @@ class ObservationParameters:
     """Probability with which a superpixel's motion says nothing of its body."""
     motion_cost: float = 12.0
     """Nats that a motion must explain better than all others do, to be one: three superpixels' worth."""
+    along: float = 0.12
+    """Probability with which a neighbour that is another body moves as one does: it is pushed along."""
     still_share: float = 0.5
     """Least share of standing still: most does."""
     still: float = 0.5
@@ -97,7 +99,9 @@ def observe(
         motions_K=motions_K[needed],
         motion=motion,
         nats=nats,
-        evidence=bond_evidence(q, share, keyframe.borders),
+        evidence=bond_evidence(
+            q, np.where(np.arange(len(share)) == 0, share[0], parameters.along), keyframe.borders
+        ),
         span=np.array(spans)[motion],
     )
 

@@ -24,6 +24,7 @@ from riseg_drake.segmentation.belief import (
     carry_bodies,
     first_belief,
     next_belief,
+    rebased,
     standing,
 )
 from riseg_drake.segmentation.bfif import BFIFParameters
@@ -220,8 +221,11 @@ def _carried(
         label_K = belief.keyframe.image_of(bodies.body.astype(np.uint16))
         memory = remember(now.memory, FramePair(belief.keyframe.frame, frame), label_K, moves)
     following = next_belief(belief, seen, bodies, frame, above, remembered, bfif.noise, parameters.belief)
+    # The pair's reference, from which the next groups tell, may be older than the new keyframe.
+    seen_so_far = {pair.reference.sequence: standing(belief), **now.bodies}
+    since = {s: rebased(b, bodies, belief.keyframe, following) for s, b in seen_so_far.items()}
     return replace(
-        now, margin=margin, belief=following, bodies={}, memory=memory, decided=now.decided or deciding
+        now, margin=margin, belief=following, bodies=since, memory=memory, decided=now.decided or deciding
     )
 
 
