@@ -1,7 +1,7 @@
 """What is believed of a keyframe: which borders lie inside one body, what has moved, and the ids."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.observation import Observation
 from riseg_drake.segmentation.partition import (
     PartitionParameters,
+    apart,
     motions_of_parts,
     partition,
     with_ids,
@@ -94,11 +95,16 @@ def standing(belief: Belief) -> Bodies:
     return Bodies(belief.body, still, np.eye(4)[None], belief.next_id)
 
 
-def bodies_of(belief: Belief, seen: Observation, before: Bodies | None, parameters: BeliefParameters) -> Bodies:
-    """The bodies, with what one frame says; ids are those of the belief, and for what it did not know those of
-    the frame before."""
+def bodies_of(
+    belief: Belief, seen: Observation, before: Bodies | None, parameters: BeliefParameters
+) -> tuple[Observation, Bodies]:
+    """The bodies, with what one frame says, and that with what the bodies' motions add to its evidence.
+
+    Ids are those of the belief, and for what it did not know those of the frame before.
+    """
     keyframe = belief.keyframe
-    part = partition(keyframe, belief.bond + seen.evidence, parameters.partition)
+    part = partition(keyframe, belief.bond + seen.evidence, parameters.partition, seen.nats)
+    seen = replace(seen, evidence=seen.evidence + apart(keyframe, part, seen.nats, parameters.partition))
     motion = motions_of_parts(part, seen.nats, parameters.partition)
     found_before = np.bincount(part, keyframe.area * (belief.body > 0), len(motion))
     moved = (motion > 0) | (2 * found_before > np.bincount(part, keyframe.area, len(motion)))
@@ -106,7 +112,7 @@ def bodies_of(belief: Belief, seen: Observation, before: Bodies | None, paramete
     # What was found in motion and is gone leaves no gap in the numbers.
     next_id = max(belief.next_id, 0 if before is None else int(before.body.max(initial=0)) + 1)
     body, next_id = with_ids(part, moved, keyframe.area, previous, next_id)
-    return Bodies(body, motion[part], seen.motions_K, next_id)
+    return seen, Bodies(body, motion[part], seen.motions_K, next_id)
 
 
 def carry_bodies(

@@ -161,7 +161,7 @@ def _explained(
     seen = observe(
         belief.keyframe, frame, belief.bond, belief.part, candidates_K, depth_noise, parameters.observation
     )
-    return seen, bodies_of(belief, seen, before, parameters.belief)
+    return bodies_of(belief, seen, before, parameters.belief)
 
 
 def _searched(
