@@ -17,9 +17,10 @@ class PartitionParameters:
     area_min: float = 3.0e-4
     """m^2; what is smaller is no object of its own."""
     rigid_min: float = 60.0
-    """Nats."""
+    """Nats that it must cost two parts to have one motion, before it counts against their being one body:
+    fifteen superpixels' worth, as highlights and shadows make errors that are alike in many."""
     most_apart: float = 2.0
-    """Nats."""
+    """Nats a border that this is remembered as, at most: as much as the still picture says at most."""
     moved_min: float = 8.0
     """Nats by which a motion must explain a body better than standing still does: two superpixels' worth."""
     margins: list[float] = field(default_factory=lambda: [0.5, 1.0, 1.5, 2.0, 3.0, 4.0])
