@@ -96,15 +96,24 @@ def standing(belief: Belief) -> Bodies:
 
 
 def bodies_of(
-    belief: Belief, seen: Observation, before: Bodies | None, parameters: BeliefParameters
+    belief: Belief,
+    seen: Observation,
+    before: Bodies | None,
+    parameters: BeliefParameters,
+    *,
+    at_rest: bool,
 ) -> tuple[Observation, Bodies]:
     """The bodies, with what one frame says, and that with what the bodies' motions add to its evidence.
 
-    Ids are those of the belief, and for what it did not know those of the frame before.
+    Ids are those of the belief, and for what it did not know those of the frame before. Only `at_rest` motions
+    are known so well that a body which none of them explains falls apart for it.
     """
     keyframe = belief.keyframe
-    part = partition(keyframe, belief.bond + seen.evidence, parameters.partition, seen.nats)
-    seen = replace(seen, evidence=seen.evidence + apart(keyframe, part, seen.nats, parameters.partition))
+    part = partition(
+        keyframe, belief.bond + seen.evidence, parameters.partition, seen.nats if at_rest else None
+    )
+    if at_rest:
+        seen = replace(seen, evidence=seen.evidence + apart(keyframe, part, seen.nats, parameters.partition))
     motion = motions_of_parts(part, seen.nats, parameters.partition)
     found_before = np.bincount(part, keyframe.area * (belief.body > 0), len(motion))
     moved = (motion > 0) | (2 * found_before > np.bincount(part, keyframe.area, len(motion)))

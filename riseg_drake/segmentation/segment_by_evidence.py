@@ -111,7 +111,10 @@ def segment_by_evidence(
     if deciding:
         candidates_K = _searched(belief, frame, above_1, candidates_K, depth_noise, parameters)
         if len(candidates_K):
-            seen, bodies = _explained(belief, frame, candidates_K, bodies, depth_noise, parameters)
+            at_rest = now.still_since is not None
+            seen, bodies = _explained(
+                belief, frame, candidates_K, bodies, depth_noise, parameters, at_rest=at_rest
+            )
     return _carried(now, pair, above_1, seen, bodies, deciding, parameters, bfif)
 
 
@@ -156,12 +159,14 @@ def _explained(
     before: Bodies,
     depth_noise: float,
     parameters: EvidenceParameters,
+    *,
+    at_rest: bool = False,
 ) -> tuple[Observation, Bodies]:
     """What a frame says, given some motions [C, 4, 4], and the bodies by it."""
     seen = observe(
         belief.keyframe, frame, belief.bond, belief.part, candidates_K, depth_noise, parameters.observation
     )
-    return bodies_of(belief, seen, before, parameters.belief)
+    return bodies_of(belief, seen, before, parameters.belief, at_rest=at_rest)
 
 
 def _searched(
