@@ -1,12 +1,13 @@
 """What is believed of a keyframe: which borders lie inside one body, what has moved, and the ids."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
+from riseg_drake.geometry.se3 import inverse
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.border_prior import BorderPriorParameters, border_prior
 from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe
@@ -14,6 +15,7 @@ from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.observation import Observation
 from riseg_drake.segmentation.partition import (
     PartitionParameters,
+    apart,
     motions_of_parts,
     partition,
     with_ids,
@@ -93,11 +95,25 @@ def standing(belief: Belief) -> Bodies:
     return Bodies(belief.body, still, np.eye(4)[None], belief.next_id)
 
 
-def bodies_of(belief: Belief, seen: Observation, before: Bodies | None, parameters: BeliefParameters) -> Bodies:
-    """The bodies, with what one frame says; ids are those of the belief, and for what it did not know those of
-    the frame before."""
+def bodies_of(
+    belief: Belief,
+    seen: Observation,
+    before: Bodies | None,
+    parameters: BeliefParameters,
+    *,
+    at_rest: bool,
+) -> tuple[Observation, Bodies]:
+    """The bodies, with what one frame says, and that with what the bodies' motions add to its evidence.
+
+    Ids are those of the belief, and for what it did not know those of the frame before. Only `at_rest` motions
+    are known so well that a body which none of them explains falls apart for it.
+    """
     keyframe = belief.keyframe
-    part = partition(keyframe, belief.bond + seen.evidence, parameters.partition)
+    part = partition(
+        keyframe, belief.bond + seen.evidence, parameters.partition, seen.nats if at_rest else None
+    )
+    if at_rest:
+        seen = replace(seen, evidence=seen.evidence + apart(keyframe, part, seen.nats, parameters.partition))
     motion = motions_of_parts(part, seen.nats, parameters.partition)
     found_before = np.bincount(part, keyframe.area * (belief.body > 0), len(motion))
     moved = (motion > 0) | (2 * found_before > np.bincount(part, keyframe.area, len(motion)))
@@ -105,7 +121,7 @@ def bodies_of(belief: Belief, seen: Observation, before: Bodies | None, paramete
     # What was found in motion and is gone leaves no gap in the numbers.
     next_id = max(belief.next_id, 0 if before is None else int(before.body.max(initial=0)) + 1)
     body, next_id = with_ids(part, moved, keyframe.area, previous, next_id)
-    return Bodies(body, motion[part], seen.motions_K, next_id)
+    return seen, Bodies(body, motion[part], seen.motions_K, next_id)
 
 
 def carry_bodies(
@@ -173,6 +189,24 @@ def next_belief(
         next_id=bodies.next_id,
         part=partition(new, prior + evidence, parameters.partition),
     )
+
+
+def rebased(then: Bodies, now: Bodies, old: Keyframe, following: Belief) -> Bodies:
+    """How bodies had moved `then`, since the keyframe of `now`, which follows the `old` one: backwards, mostly.
+
+    `then` and `now` are told since the old keyframe.
+    """
+    X_NO = inverse(following.keyframe.frame.X_WC) @ old.frame.X_WC
+    motions, motion = [np.eye(4)], np.zeros(following.keyframe.count, np.intp)
+    for a in np.unique(following.body[following.body > 0]):
+        mine = now.body == a
+        if not mine.any():
+            continue
+        k = np.bincount(then.motion[mine], old.area[mine]).argmax()
+        motion[following.body == a] = len(motions)
+        since = then.motions_K[k] @ inverse(now.motions_K[now.motion[mine][0]])
+        motions.append(X_NO @ since @ inverse(X_NO))
+    return Bodies(following.body, motion, np.array(motions), following.next_id)
 
 
 def _carried_evidence(

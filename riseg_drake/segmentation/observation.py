@@ -1,11 +1,12 @@
 """What one frame says of a keyframe: which motion each superpixel has, and which neighbours moved as one.
 
-For a motion k of the share pi_k of what stands there, and superpixels a, b that have it with the
-probabilities q_a(k) and q_b(k), being one body or not makes the two motions agree always, or by chance:
+Superpixels a, b have the motion k, of the share pi_k of what stands there, with the probabilities q_a(k),
+q_b(k). Those of one body have the same. If a has k, a neighbour that is another body has l with the probability
+rho(l | k): what moves pushes it along now and then, what stands still mostly stands beside what does so, too.
 
-    evidence(a, b) = log( sum_k q_a(k) q_b(k) / pi_k )
+    evidence(a, b) = log( sum_k q_a(k) q_b(k) / pi_k ) - log( sum_k,l q_a(k) rho(l | k) q_b(l) / pi_l )
 
-Standing still together says little, sharing a rare motion says much, moving apart says most.
+Standing still together says little, moving together more, moving apart most; who says nothing says nothing.
 """
 
 from dataclasses import dataclass, field
@@ -31,6 +32,10 @@ class ObservationParameters:
     """Probability with which a superpixel's motion says nothing of its body."""
     motion_cost: float = 12.0
     """Nats that a motion must explain better than all others do, to be one: three superpixels' worth."""
+    along: float = 0.12
+    """rho(k | k) of a motion: probability with which a thing pushes its neighbour along as if they were one."""
+    stays: float = 0.8
+    """rho(k | k) of standing still: with which the neighbour of what stands still stands still, too."""
     still_share: float = 0.5
     """Least share of standing still: most does."""
     still: float = 0.5
@@ -97,7 +102,7 @@ def observe(
         motions_K=motions_K[needed],
         motion=motion,
         nats=nats,
-        evidence=bond_evidence(q, share, keyframe.borders),
+        evidence=bond_evidence(q, share, keyframe.borders, parameters.stays, parameters.along),
         span=np.array(spans)[motion],
     )
 
@@ -115,11 +120,25 @@ def motion_posterior(
 
 
 def bond_evidence(
-    q: NDArray[np.float64], share: NDArray[np.float64], borders: NDArray[np.intp]
+    q: NDArray[np.float64],
+    share: NDArray[np.float64],
+    borders: NDArray[np.intp],
+    stays: float,
+    along: float,
 ) -> NDArray[np.float64]:
-    """[M], log-odds that both sides of borders [M, 2] are one body: log sum_k q_a(k) q_b(k) / pi_k."""
+    """[M], log-odds that both sides of borders [M, 2] are one body, as above.
+
+    `q` [G, N] is how likely each motion is each superpixel's own, `share` [G] how common each is, `stays` and
+    `along` the probabilities with which another body does as its neighbour that stands still, or moves.
+    """
     a, b = borders.T
-    return np.log((q[:, a] * q[:, b] / share[:, None]).sum(0))
+    agreement = (q[:, a] * q[:, b] / share[:, None]).sum(0)
+    same = np.append(stays, np.full(len(share) - 1, along))
+    other = np.where(np.eye(len(share), dtype=bool), 0.0, share)
+    rho = np.diag(same) + (1 - same)[:, None] * other / np.maximum(other.sum(1, keepdims=True), 1e-12)
+    chance = rho @ (q / share[:, None])  # [G, N]
+    by_chance = ((q[:, a] * chance[:, b]).sum(0) + (q[:, b] * chance[:, a]).sum(0)) / 2
+    return np.log(agreement / by_chance)
 
 
 def _fewest_motions(

@@ -16,6 +16,11 @@ class PartitionParameters:
 
     area_min: float = 3.0e-4
     """m^2; what is smaller is no object of its own."""
+    rigid_min: float = 60.0
+    """Nats that it must cost two parts to have one motion, before it counts against their being one body:
+    fifteen superpixels' worth, as highlights and shadows make errors that are alike in many."""
+    most_apart: float = 2.0
+    """Nats a border that this is remembered as, at most: as much as the still picture says at most."""
     moved_min: float = 8.0
     """Nats by which a motion must explain a body better than standing still does: two superpixels' worth."""
     margins: list[float] = field(default_factory=lambda: [0.5, 1.0, 1.5, 2.0, 3.0, 4.0])
@@ -23,14 +28,38 @@ class PartitionParameters:
 
 
 def partition(
-    keyframe: Keyframe, bond: NDArray[np.float64], parameters: PartitionParameters
+    keyframe: Keyframe,
+    bond: NDArray[np.float64],
+    parameters: PartitionParameters,
+    nats: NDArray[np.float64] | None = None,
 ) -> NDArray[np.intp]:
-    """The part 0.. of each superpixel [N] for the log-odds of each border [M]; no part is too small."""
+    """The part 0.. of each superpixel [N] for the log-odds of each border [M]; no part is too small.
+
+    With `nats` [G, N], how badly each motion explains each superpixel: a body is rigid, and what saw it move
+    may be far from the border that is in question.
+    """
     weight = bond * keyframe.length
-    part = multicut(keyframe.count, keyframe.borders, weight)
+    part = multicut(keyframe.count, keyframe.borders, weight, nats, parameters.rigid_min)
     return _without_small(
         part, keyframe.borders, weight, keyframe.area, parameters.area_min * keyframe.pixels_per_metre**2
     )
+
+
+def apart(
+    keyframe: Keyframe,
+    part: NDArray[np.intp],
+    nats: NDArray[np.float64],
+    parameters: PartitionParameters,
+) -> NDArray[np.float64]:
+    """[M], log-odds of each border that speak against it since its two parts [N] have no one motion."""
+    a, b = part[keyframe.borders].T
+    count = int(part.max(initial=-1)) + 1
+    cost = np.array([np.bincount(part, n, count) for n in nats])
+    lost = (cost[:, a] + cost[:, b]).min(0) - cost.min(0)[a] - cost.min(0)[b] - parameters.rigid_min
+    pair = np.minimum(a, b) * count + np.maximum(a, b)
+    _, inverse = np.unique(pair, return_inverse=True)
+    length = np.bincount(inverse, keyframe.length)[inverse]
+    return np.where(a != b, -np.clip(lost / np.maximum(length, 1e-9), 0.0, parameters.most_apart), 0.0)
 
 
 def motions_of_parts(

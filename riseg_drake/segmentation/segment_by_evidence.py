@@ -24,6 +24,7 @@ from riseg_drake.segmentation.belief import (
     carry_bodies,
     first_belief,
     next_belief,
+    rebased,
     standing,
 )
 from riseg_drake.segmentation.bfif import BFIFParameters
@@ -110,7 +111,10 @@ def segment_by_evidence(
     if deciding:
         candidates_K = _searched(belief, frame, above_1, candidates_K, depth_noise, parameters)
         if len(candidates_K):
-            seen, bodies = _explained(belief, frame, candidates_K, bodies, depth_noise, parameters)
+            at_rest = now.still_since is not None
+            seen, bodies = _explained(
+                belief, frame, candidates_K, bodies, depth_noise, parameters, at_rest=at_rest
+            )
     return _carried(now, pair, above_1, seen, bodies, deciding, parameters, bfif)
 
 
@@ -155,12 +159,14 @@ def _explained(
     before: Bodies,
     depth_noise: float,
     parameters: EvidenceParameters,
+    *,
+    at_rest: bool = False,
 ) -> tuple[Observation, Bodies]:
     """What a frame says, given some motions [C, 4, 4], and the bodies by it."""
     seen = observe(
         belief.keyframe, frame, belief.bond, belief.part, candidates_K, depth_noise, parameters.observation
     )
-    return seen, bodies_of(belief, seen, before, parameters.belief)
+    return bodies_of(belief, seen, before, parameters.belief, at_rest=at_rest)
 
 
 def _searched(
@@ -220,8 +226,11 @@ def _carried(
         label_K = belief.keyframe.image_of(bodies.body.astype(np.uint16))
         memory = remember(now.memory, FramePair(belief.keyframe.frame, frame), label_K, moves)
     following = next_belief(belief, seen, bodies, frame, above, remembered, bfif.noise, parameters.belief)
+    # The pair's reference, from which the next groups tell, may be older than the new keyframe.
+    seen_so_far = {pair.reference.sequence: standing(belief), **now.bodies}
+    since = {s: rebased(b, bodies, belief.keyframe, following) for s, b in seen_so_far.items()}
     return replace(
-        now, margin=margin, belief=following, bodies={}, memory=memory, decided=now.decided or deciding
+        now, margin=margin, belief=following, bodies=since, memory=memory, decided=now.decided or deciding
     )
 
 

@@ -54,3 +54,40 @@ def test_parts_do_not_depend_on_the_order_of_the_borders():
     weight = rng.normal(size=len(edges))
     order = rng.permutation(len(edges))
     np.testing.assert_array_equal(multicut(12, edges, weight), multicut(12, edges[order], weight[order]))
+
+
+ROW = np.array([[0, 1], [1, 2], [2, 3], [3, 4], [4, 5]])
+
+
+def test_two_parts_that_no_one_motion_explains_are_two_though_nothing_is_seen_at_their_border():
+    # Nodes 0 and 5 saw two motions; all between saw nothing, and every border says that it is inside.
+    nats = np.array([[0.0, 0, 0, 0, 0, 9.0], [9.0, 0, 0, 0, 0, 0.0]])
+    weight = np.array([3.0, 3.0, 1.0, 3.0, 3.0])
+    np.testing.assert_array_equal(multicut(6, ROW, weight), [0] * 6)
+    np.testing.assert_array_equal(multicut(6, ROW, weight, nats, free=7.5), [0, 0, 0, 1, 1, 1])
+    # 9 nats are lost, of which 8.5 are free; the half that is left is less than the weakest bond.
+    np.testing.assert_array_equal(multicut(6, ROW, weight, nats, free=8.5), [0] * 6)
+
+
+def test_a_motion_that_explains_both_costs_nothing():
+    nats = np.array([[0.0, 0, 0, 9.0, 9.0, 9.0], [9.0, 9.0, 9.0, 0, 0, 0], [1.0, 0, 0, 0, 0, 1.0]])
+    np.testing.assert_array_equal(multicut(6, ROW, np.ones(5), nats[:2]), [0, 0, 0, 1, 1, 1])
+    np.testing.assert_array_equal(multicut(6, ROW, np.ones(5), nats, free=2.0), [0] * 6)
+
+
+def test_what_was_refused_is_asked_again_when_parts_have_grown():
+    # 1 and 2 disagree by themselves; with 0 and 3, which saw a third motion, both have that.
+    nats = np.array([[0.0, 0.0, 5.0, 0.0], [0.0, 5.0, 0.0, 0.0], [0.0, 2.0, 2.0, 0.0]])
+    nats[:2, [0, 3]] = 20.0
+    edges = np.array([[0, 1], [1, 2], [2, 3]])
+    np.testing.assert_array_equal(multicut(4, edges, np.array([2.5, 3.0, 2.5]), nats), [0] * 4)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_without_motions_or_with_one_it_is_the_same(seed):
+    rng = np.random.default_rng(seed)
+    edges = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if rng.uniform() < 0.5])
+    weight = rng.normal(size=len(edges))
+    expected = multicut(8, edges, weight)
+    np.testing.assert_array_equal(multicut(8, edges, weight, np.zeros((1, 8))), expected)
+    np.testing.assert_array_equal(multicut(8, edges, weight, np.zeros((3, 8))), expected)

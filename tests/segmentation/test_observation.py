@@ -6,11 +6,19 @@ from riseg_drake.segmentation.observation import bond_evidence, motion_posterior
 SHARE = np.array([0.8, 0.2])
 
 
-def test_standing_still_together_says_little_and_a_rare_motion_shared_says_much():
-    # Superpixels 0 and 1 stand still for sure, 2 and 3 move for sure: log 1/0.8 and log 1/0.2.
-    q = np.array([[1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.0]])
-    evidence = bond_evidence(q, SHARE, np.array([[0, 1], [2, 3]]))
-    assert evidence == pytest.approx([np.log(1.25), np.log(5.0)])
+STAYS, ALONG = 0.8, 0.1
+
+
+def evidence_between(q, share=SHARE):
+    return bond_evidence(q, share, np.array([[0, 1]]), STAYS, ALONG)
+
+
+@pytest.mark.parametrize("share", [SHARE, np.array([0.5, 0.5]), np.array([0.9, 0.06, 0.04])])
+def test_standing_still_together_says_little_and_moving_together_more_however_common_it_is(share):
+    still, moves = np.zeros((len(share), 2)), np.zeros((len(share), 2))
+    still[0] = moves[1] = 1.0
+    assert evidence_between(still, share) == pytest.approx([np.log(1 / STAYS)])
+    assert evidence_between(moves, share) == pytest.approx([np.log(1 / ALONG)])
 
 
 def test_moving_apart_is_as_bad_as_outliers_allow():
@@ -19,15 +27,24 @@ def test_moving_apart_is_as_bad_as_outliers_allow():
     q = motion_posterior(nats, SHARE, outlier=0.02)
     assert q[:, 0] == pytest.approx([0.996, 0.004])
     assert q[:, 1] == pytest.approx([0.016, 0.984])
-    expected = np.log(0.996 * 0.016 / 0.8 + 0.004 * 0.984 / 0.2)
-    assert bond_evidence(q, SHARE, np.array([[0, 1]])) == pytest.approx([expected])
+    one_body = 0.996 * 0.016 / 0.8 + 0.004 * 0.984 / 0.2
+    # Two: the neighbour of a stays still with 0.8 and moves with 0.2; that of b moves along with 0.1.
+    beside_a = 0.996 * (0.8 * 0.016 / 0.8 + 0.2 * 0.984 / 0.2) + 0.004 * (0.9 * 0.016 / 0.8 + 0.1 * 0.984 / 0.2)
+    beside_b = 0.016 * (0.8 * 0.996 / 0.8 + 0.2 * 0.004 / 0.2) + 0.984 * (0.9 * 0.996 / 0.8 + 0.1 * 0.004 / 0.2)
+    expected = np.log(one_body / ((beside_a + beside_b) / 2))
+    assert evidence_between(q) == pytest.approx([expected])
     assert expected < -3
 
 
-def test_who_says_nothing_is_no_evidence():
-    q = motion_posterior(np.array([[0.0, 0.0], [0.0, 50.0]]), SHARE, outlier=0.02)
+@pytest.mark.parametrize("other", [0.0, 50.0, -50.0])
+def test_who_says_nothing_is_no_evidence_to_speak_of_whatever_its_neighbour_does(other):
+    q = motion_posterior(np.array([[0.0, 0.0], [0.0, other]]), SHARE, outlier=0.0)
     assert q[:, 0] == pytest.approx(SHARE)
-    assert bond_evidence(q, SHARE, np.array([[0, 1]])) == pytest.approx([0.0])
+    # One body: sum_k q_b(k) = 1. Two: 1 from the one side, and from the other sum_k pi_k rho(l | k) / pi_l.
+    move = 0.8 * 0.2 / 0.2 + 0.2 * 0.1 / 0.2
+    stay = 0.8 * 0.8 / 0.8 + 0.2 * 0.9 / 0.8
+    by_chance = {0.0: 1.0, 50.0: (1 + stay) / 2, -50.0: (1 + move) / 2}[other]
+    assert evidence_between(q) == pytest.approx([-np.log(by_chance)], abs=1e-6)
 
 
 def test_costs_and_commonness_weigh_as_bayes_has_it():

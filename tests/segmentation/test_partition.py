@@ -5,6 +5,7 @@ import pytest
 
 from riseg_drake.segmentation.partition import (
     PartitionParameters,
+    apart,
     margins,
     motions_of_parts,
     partition,
@@ -46,6 +47,25 @@ def test_small_parts_grow_until_they_are_large_enough():
     part = partition(Row(least=25), np.array([-1.0, -2.0, -3.0, -4.0]), PartitionParameters())
     # 0 joins 1, that is still too small and joins 2; 3 is pulled to that as well, and 4 to it.
     assert part.max() == 0
+
+
+def test_that_two_parts_have_no_one_motion_is_remembered_at_all_borders_between_them():
+    nats = np.array([[0.0, 0.0, 0.0, 70.0, 0.0], [50.0, 14.0, 0.0, 0.0, 0.0]])
+    row, part = Row(), np.array([0, 0, 0, 1, 1])
+    row.length = np.array([1.0, 1.0, 8.0, 1.0])
+    # One motion for both would cost min(70, 64) = 64 nats, 4 more than are free, over a border of 8.
+    evidence = apart(row, part, nats, PartitionParameters(rigid_min=60.0))
+    np.testing.assert_allclose(evidence, [0, 0, -0.5, 0])
+    assert not apart(row, part, nats, PartitionParameters(rigid_min=64.0)).any()
+    most = apart(row, part, nats, PartitionParameters(rigid_min=0.0, most_apart=2.0))
+    np.testing.assert_allclose(most, [0, 0, -2.0, 0])
+
+
+def test_two_with_motions_of_their_own_are_two_though_the_border_says_one():
+    nats = np.array([[0.0, 0.0, 0.0, 0.0, 70.0], [70.0, 0.0, 0.0, 0.0, 0.0]])
+    bond = np.array([3.0, 3.0, 0.5, 3.0])
+    assert partition(Row(), bond, PartitionParameters()).max() == 0
+    np.testing.assert_array_equal(partition(Row(), bond, PartitionParameters(), nats), [0, 0, 0, 1, 1])
 
 
 def test_a_part_moves_where_two_sure_superpixels_say_so():

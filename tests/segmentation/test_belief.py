@@ -1,0 +1,32 @@
+"""What is kept of bodies when the keyframe changes."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from riseg_drake.geometry.se3 import exp_se3, inverse
+from riseg_drake.segmentation.belief import Bodies, rebased
+
+
+def test_how_bodies_had_moved_when_the_reference_was_taken_is_told_since_the_new_keyframe():
+    X_WO, X_WN = (
+        exp_se3(np.array([0.1, 0.2, 0.0, 0.0, 0.0, 0.6])),
+        exp_se3(np.array([0.0, -0.1, 0.3, 0.1, 0.0, 0.5])),
+    )
+    rng = np.random.default_rng(0)
+    # Poses in W of two bodies, of which the second stood still, at the old keyframe, then, and at the new one.
+    X_WB = [exp_se3(0.1 * rng.normal(size=6)) for _ in range(3)]
+    since_old = [inverse(X_WO) @ X @ inverse(X_WB[0]) @ X_WO for X in X_WB]
+    body = np.array([4, 4, 7])
+    then = Bodies(body, np.array([1, 1, 0]), np.array([np.eye(4), since_old[1]]), 8)
+    now = Bodies(body, np.array([1, 1, 0]), np.array([np.eye(4), since_old[2]]), 8)
+    old = SimpleNamespace(frame=SimpleNamespace(X_WC=X_WO), area=np.array([5, 5, 5]))
+    new = SimpleNamespace(frame=SimpleNamespace(X_WC=X_WN), count=4)
+    following = SimpleNamespace(keyframe=new, body=np.array([7, 4, 0, 4]), next_id=8)
+    told = rebased(then, now, old, following)
+    expected = inverse(X_WN) @ X_WB[1] @ inverse(X_WB[2]) @ X_WN  # from the new keyframe back to then
+    for superpixel, motion in enumerate([np.eye(4), expected, np.eye(4), expected]):
+        np.testing.assert_allclose(told.motions_K[told.motion[superpixel]], motion, atol=1e-12)
+    at_the_keyframe = rebased(now, now, old, following)
+    for X in at_the_keyframe.motions_K:
+        np.testing.assert_allclose(X, np.eye(4), atol=1e-12)
