@@ -226,14 +226,16 @@ class CommandStream:
 
     def _set_out(self, before: SafetyState, status: ArmStatus) -> None:
         """Begin to move, or go on after a pause, at the path's nearest point; stay where that is too far."""
-        if before.mode is Mode.PAUSED:
+        goes_on = before.mode is Mode.PAUSED
+        if goes_on:
             assert self._limiter is not None
             here = self._limiter.stop() - self._drift.value
         else:
             here = self._start(status)
-            if not self._playout.distance(here) <= self._parameters.safety.off_path:
-                self.state = SafetyState(Mode.STOPPED, Cause.GAP)
-                return
+        if not self._playout.distance(here) <= self._parameters.safety.off_path:
+            self.state = SafetyState(Mode.STOPPED, Cause.GAP)
+            return
+        if not goes_on:
             self._rest_at(here)
             self._p_WE_begun = self._tip.position(here)
         self._playout.resume_near(here)

@@ -210,13 +210,16 @@ def test_an_arm_that_is_far_away_when_its_status_comes_again_hears_not_even_a_st
     assert not lab.sent()
 
 
-def paused_in_motion(drifted):
-    """An arm in velocity mode that came off its commands by `drifted` rad on its way, pictures having ended."""
+def paused_in_motion(drifted, joint=0):
+    """An arm in velocity mode that came off its commands by `drifted` rad on its way, pictures having ended.
+
+    Its way is one of joint 0.
+    """
     lab = Lab("velocity")
     lab.go(READY + np.array([0.8, 0, 0, 0, 0, 0, 0]))
     lab.run(1.2)
     assert lab.speeds[-1].max() > VelocityDrift.SLOW
-    lab.q = lab.q + np.array([drifted, 0, 0, 0, 0, 0, 0])
+    lab.q[joint] += drifted
     lab.delay_images()
     lab.run(0.5)
     assert lab.stream.state == SafetyState(Mode.PAUSED, Cause.IMAGES_OLD)
@@ -229,6 +232,13 @@ def test_in_velocity_mode_drift_on_the_way_is_no_reason_to_stop_after_a_pause():
     lab.run(6.0)
     assert lab.stream.state.mode is Mode.FOLLOWING
     assert np.abs(lab.q - lab.path.value(lab.path.end_time())[:, 0]).max() < 0.002
+
+
+def test_but_off_its_path_it_does_not_go_back_to_that_by_itself():
+    lab = paused_in_motion(0.025, joint=1)
+    lab.show_images()
+    lab.run(1.0)
+    assert lab.stream.state == SafetyState(Mode.STOPPED, Cause.GAP)
 
 
 @pytest.mark.parametrize(("missing", "goes_on"), [(0.1, True), (-0.1, True), (0.2, False)])
