@@ -41,7 +41,7 @@ def multicut(
         if (size_a, size_b) != (size[a], size[b]):
             if size_a == 0 and w != -negative:
                 continue  # their bond has changed
-            lost = 0.0 if cost is None else _loss(cost[a], cost[b]) - free
+            lost = 0.0 if cost is None else float(loss(cost[a], cost[b])) - free
             if lost > 0:
                 if w > lost:
                     heapq.heappush(queue, (lost - w, a, b, size[a], size[b]))
@@ -74,6 +74,7 @@ def multicut(
     return np.unique(parent, return_inverse=True)[1]
 
 
-def _loss(cost_a: NDArray[np.float64], cost_b: NDArray[np.float64]) -> float:
-    """What it costs two parts to have one motion, nats, by how badly each motion explains each [G]."""
-    return float((cost_a + cost_b).min() - cost_a.min() - cost_b.min())
+def loss(cost_a: NDArray[np.float64], cost_b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What it costs pairs of parts to have one motion, nats [...], by how badly each explains each [G, ...]."""
+    shared: NDArray[np.float64] = (cost_a + cost_b).min(0) - cost_a.min(0) - cost_b.min(0)
+    return shared

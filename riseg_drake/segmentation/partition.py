@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.segmentation.keyframe import Keyframe
-from riseg_drake.segmentation.multicut import multicut
+from riseg_drake.segmentation.multicut import loss, multicut
 
 
 @dataclass
@@ -53,10 +53,9 @@ def apart(
 ) -> NDArray[np.float64]:
     """[M], log-odds of each border that speak against it since its two parts [N] have no one motion."""
     a, b = part[keyframe.borders].T
-    count = int(part.max(initial=-1)) + 1
-    cost = np.array([np.bincount(part, n, count) for n in nats])
-    lost = (cost[:, a] + cost[:, b]).min(0) - cost.min(0)[a] - cost.min(0)[b] - parameters.rigid_min
-    pair = np.minimum(a, b) * count + np.maximum(a, b)
+    cost = _nats_of_parts(part, nats)
+    lost = loss(cost[:, a], cost[:, b]) - parameters.rigid_min
+    pair = np.minimum(a, b) * cost.shape[1] + np.maximum(a, b)
     _, inverse = np.unique(pair, return_inverse=True)
     length = np.bincount(inverse, keyframe.length)[inverse]
     return np.where(a != b, -np.clip(lost / np.maximum(length, 1e-9), 0.0, parameters.most_apart), 0.0)
@@ -72,10 +71,15 @@ def motions_of_parts(
         nats: [G, N], how badly each motion explains each superpixel; the first is standing still.
         parameters: see there.
     """
-    count = int(part.max(initial=-1)) + 1
-    worse = np.array([np.bincount(part, n, count) for n in nats])
+    worse = _nats_of_parts(part, nats)
     worse[1:] += parameters.moved_min
     return worse.argmin(0)
+
+
+def _nats_of_parts(part: NDArray[np.intp], nats: NDArray[np.float64]) -> NDArray[np.float64]:
+    """[G, P], how badly each motion explains all of each part."""
+    count = int(part.max(initial=-1)) + 1
+    return np.array([np.bincount(part, n, count) for n in nats])
 
 
 def with_ids(
