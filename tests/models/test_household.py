@@ -12,10 +12,10 @@ from pydrake.multibody.tree import CalcSpatialInertia, SpatialInertia
 from riseg_drake.models.household.make_household import make_thing
 from riseg_drake.models.household.things import THINGS
 
-from riseg_drake.stations.object_models import ObjectModel, find_models, parse_body, resolve
+from riseg_drake.stations.object_models import parse_body, resolve
 
-HOUSEHOLD = "package://riseg_drake_models/household"
-FOLDER = resolve(HOUSEHOLD)
+MODELS = "package://riseg_drake_models/household"
+FOLDER = resolve(MODELS)
 NAMES = sorted(path.stem for path in FOLDER.glob("*/*.sdf"))
 named = pytest.mark.parametrize(
     "model",
@@ -23,16 +23,6 @@ named = pytest.mark.parametrize(
     indirect=True,
 )
 """Every fourth for the fast tests, the others behind the mark."""
-
-
-@pytest.fixture(scope="module")
-def models() -> dict[str, ObjectModel]:
-    return {model.name: model for model in find_models(HOUSEHOLD)}
-
-
-@pytest.fixture
-def model(models, request) -> ObjectModel:
-    return models[request.param]
 
 
 def read_gltf(path: Path) -> tuple[np.ndarray, np.ndarray, dict]:

@@ -29,21 +29,11 @@ from riseg_drake.models.objects.make_objects import make_toy
 from riseg_drake.models.objects.toys import TOYS
 
 from riseg_drake.stations.footprint import Footprint, travel
-from riseg_drake.stations.object_models import ObjectModel, find_models, parse_body, resolve
+from riseg_drake.stations.object_models import ObjectModel, parse_body, resolve
 
-OBJECTS = "package://riseg_drake_models/objects"
-FOLDER = resolve(OBJECTS)
+MODELS = "package://riseg_drake_models/objects"
+FOLDER = resolve(MODELS)
 named = pytest.mark.parametrize("model", sorted(path.stem for path in FOLDER.glob("*/*.sdf")), indirect=True)
-
-
-@pytest.fixture(scope="module")
-def models() -> dict[str, ObjectModel]:
-    return {model.name: model for model in find_models(OBJECTS)}
-
-
-@pytest.fixture
-def model(models, request) -> ObjectModel:
-    return models[request.param]
 
 
 @cache
