@@ -30,9 +30,10 @@ class ObservationParameters:
     alignment: AlignmentParameters = field(default_factory=AlignmentParameters)
     outlier: float = 0.02
     """Probability with which a superpixel's motion says nothing of its body."""
-    motion_cost: float = 12.0
-    """Nats that a motion must explain better than all others do, to be one: three superpixels' worth."""
-    along: float = 0.12
+    motion_cost: float = 30.0
+    """Nats that a motion must explain better than all others do, to be one: eight superpixels' worth, since errors
+    of the view are common to neighbours."""
+    along: float = 0.2
     """rho(k | k) of a motion: probability with which a thing pushes its neighbour along as if they were one."""
     stays: float = 0.8
     """rho(k | k) of standing still: with which the neighbour of what stands still stands still, too."""

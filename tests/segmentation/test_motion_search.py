@@ -148,8 +148,8 @@ def test_boxes_get_their_motions_and_borders_inside_them_hold():
     a, b = keyframe.borders.T
     apart = truth[a] != truth[b]
     assert np.median(seen.evidence[apart]) < -1.5
-    # Standing still together, as the second does, says log 1 / 0.8, moving together log 1 / 0.12, less what
+    # Standing still together, as the second does, says log 1 / 0.8, moving together log 1 / 0.2, less what
     # superpixels leave open.
     shared = [np.median(seen.evidence[~apart & (truth[a] == k)]) for k in (1, 2, 3)]
-    assert shared == pytest.approx([np.log(1 / 0.12), np.log(1 / 0.8), np.log(1 / 0.12)], abs=0.3)
+    assert shared == pytest.approx([np.log(1 / 0.2), np.log(1 / 0.8), np.log(1 / 0.2)], abs=0.3)
     assert shared[1] == pytest.approx(np.log(1 / 0.8), abs=0.05)
