@@ -31,8 +31,8 @@ class ObservationParameters:
     outlier: float = 0.02
     """Probability with which a superpixel's motion says nothing of its body."""
     motion_cost: float = 30.0
-    """Nats that a motion must explain better than all others do, to be one: eight superpixels' worth, since errors
-    of the view are common to neighbours."""
+    """Nats that a motion must explain better than all others do, to be one: eight superpixels' worth:
+    errors of the view are common to neighbours."""
     along: float = 0.2
     """rho(k | k) of a motion: probability with which a thing pushes its neighbour along as if they were one."""
     stays: float = 0.8
