@@ -28,16 +28,19 @@ class ModelFileError(ValueError):
 def reading_model(path: Path) -> Iterator[None]:
     """For Drake's parsers to read a file in a `with`. Raises ModelFileError for what is wrong with it.
 
-    Some faults they only log, and go on with something of their own in the place of what they could not read.
+    Some faults they only log, and go on with something of their own in the place of what they could not read;
+    an inertia that no body can have is but a warning to them.
     """
     check_model(path)
     errors: list[str] = []
 
     def hear(record: logging.LogRecord) -> bool:
-        if record.levelno < logging.ERROR:
-            return True
-        errors.append(one_line(record.getMessage()))
-        return False
+        said = one_line(record.getMessage())
+        if record.levelno >= logging.ERROR or "invalid" in said:
+            errors.append(said)
+            return False
+        record.msg, record.args = said, ()
+        return True
 
     drake = logging.getLogger("drake")
     drake.addFilter(hear)

@@ -6,6 +6,7 @@ torch and transformers only when a model is loaded.
 
 import json
 import os
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -175,7 +176,10 @@ def load_sam(folder: Path, device: str = "auto") -> SamSegmenter:
     try:
         transformers.utils.logging.disable_progress_bar()
         model_class = getattr(transformers, MODELS[kind])
-        model, loading = model_class.from_pretrained(folder, local_files_only=True, output_loading_info=True)
+        with warnings.catch_warnings(action="ignore"):  # what is wrong is an error below, in words of its own
+            model, loading = model_class.from_pretrained(
+                folder, local_files_only=True, output_loading_info=True
+            )
     except Exception as error:  # whatever transformers and safetensors have to say
         raise ModelError(f"{folder}: {' '.join(str(error).split())[:300]}") from None
     missing = sorted(loading["missing_keys"])

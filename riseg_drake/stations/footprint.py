@@ -19,7 +19,7 @@ from pydrake.geometry import (
     Sphere,
 )
 from pydrake.math import RigidTransform
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 _CIRCLE = np.stack([np.cos(t := np.linspace(0, 2 * np.pi, 32, endpoint=False)), np.sin(t)], axis=-1)
 _POLAR = np.linspace(0, np.pi, 17)
@@ -53,7 +53,7 @@ def footprint(
 ) -> Footprint:
     """The footprint of a body with pose X_WB; the geometries' poses are taken as measured in the body.
 
-    Raises ValueError for a shape without extent of its own, such as a half space.
+    Raises ValueError for a shape without extent of its own, such as a half space, or without area from above.
     """
     clouds = [
         X_WB.multiply(inspector.GetPoseInFrame(g).multiply(shape_corners(inspector.GetShape(g)).T)).T
@@ -62,7 +62,10 @@ def footprint(
     pieces = []
     for cloud in clouds:
         flat = cloud[:, :2]
-        pieces.append(flat[ConvexHull(flat).vertices])
+        try:
+            pieces.append(flat[ConvexHull(flat).vertices])
+        except QhullError:
+            raise ValueError("a collision shape has no area, seen from above") from None
     return Footprint(tuple(_without_hidden(pieces)), float(min(cloud[:, 2].min() for cloud in clouds)))
 
 

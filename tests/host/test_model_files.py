@@ -35,6 +35,7 @@ def test_a_model_that_cannot_be_is_one_line(tmp_path, content, says):
 BALL = """<?xml version="1.0"?><sdf version="1.7"><model name="ball"><link name="ball">
 <inertial><mass>0.1</mass></inertial><collision name="c"><geometry><sphere><radius>0.03</radius></sphere>
 </geometry></collision></link></model></sdf>"""
+NO_BODYS_INERTIA = "<inertia><ixx>1e-4</ixx><iyy>1e-4</iyy><izz>1</izz></inertia>"
 
 
 @pytest.mark.parametrize(
@@ -43,6 +44,7 @@ BALL = """<?xml version="1.0"?><sdf version="1.7"><model name="ball"><link name=
         (BALL.replace("<mass>0.1", "<mass>0.1 0.1"), "could not convert string to float"),
         (BALL.replace("<?xml ", "<?: "), "not well-formed"),
         (BALL.replace("<mass>0.1", "<mass>[[["), "Error reading element <mass>"),
+        (BALL.replace("</mass>", "</mass>" + NO_BODYS_INERTIA), "ball has invalid inertia"),
     ],
 )
 def test_what_drake_only_logs_is_one_line_too(tmp_path, content, says, capfd):
@@ -51,6 +53,18 @@ def test_what_drake_only_logs_is_one_line_too(tmp_path, content, says, capfd):
         find_models(str(tmp_path))
     assert "\n" not in str(error.value)
     assert capfd.readouterr().err == ""
+
+
+def test_a_shape_too_thin_to_stand_on_is_one_line(tmp_path):
+    (tmp_path / "mesh.obj").write_text(
+        "v 0 0 0\nv 1e-312 0 0\nv 0 1e-312 1\nv 0 0 1\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 1 3 4\n"
+    )
+    thin = BALL.replace("<sphere><radius>0.03</radius></sphere>", "<mesh><uri>mesh.obj</uri></mesh>")
+    visual = '<visual name="v"><geometry><sphere><radius>0.03</radius></sphere></geometry></visual></link>'
+    (tmp_path / "ball.sdf").write_text(thin.replace("</link>", visual))
+    with pytest.raises(SceneError, match=r"ball\.sdf") as error:
+        find_models(str(tmp_path))
+    assert "\n" not in str(error.value)
 
 
 def test_a_pipe_in_the_place_of_a_model_hangs_nobody(tmp_path):
