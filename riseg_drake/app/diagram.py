@@ -196,6 +196,7 @@ def make_diagram(
     # Objects in doubt, which may be two, are pushed once more: they are not in the settled mask.
     for system in (planner, arm):
         builder.Connect(segmentation.outputs["settled_mask"], system.GetInputPort("mask"))
+    builder.Connect(segmentation.outputs["decided"], arm.GetInputPort("decided"))
     builder.Connect(segmentation.outputs["mask"], planner.GetInputPort("found"))
     builder.Connect(arm.GetOutputPort("position"), planner.GetInputPort("position"))
     builder.Connect(arm.GetOutputPort("tried_pushes"), planner.GetInputPort("tried_pushes"))

@@ -41,7 +41,7 @@ class SegmentationBlock:
     """Those of FrameView: the keys of STATION_PORTS where all follows from the joint angles."""
     outputs: dict[str, OutputPort]
     """`pair`, `above_table`, `expected_flow`, `optical_flow`, `groups`, `mask`, `settled_mask`,
-    `segmentation`."""
+    `decided`, `segmentation`."""
 
 
 def panda_view(scenario: Scenario, kinematics: PandaKinematics) -> FrameView:
@@ -103,6 +103,7 @@ def add_stages(
         "groups": grouper,
         "mask": propagator,
         "settled_mask": propagator,
+        "decided": propagator,
         "segmentation": propagator,
     }
     return SegmentationBlock(

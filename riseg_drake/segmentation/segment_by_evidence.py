@@ -107,7 +107,7 @@ def segment_by_evidence(
     depth_noise = max(above_1.depth_noise, belief.keyframe.above.depth_noise)
     if len(candidates_K) and not deciding:
         seen, bodies = _explained(belief, frame, candidates_K, bodies, depth_noise, parameters)
-        deciding = _has_gone_far(belief, frame, seen, bodies, parameters)
+        deciding = _has_gone_far(now, frame, seen, bodies, parameters)
     if deciding:
         candidates_K = _searched(belief, frame, above_1, candidates_K, depth_noise, parameters)
         if len(candidates_K):
@@ -235,12 +235,16 @@ def _carried(
 
 
 def _has_gone_far(
-    belief: Belief, frame: Frame, seen: Observation, bodies: Bodies, parameters: EvidenceParameters
+    now: Segmentation, frame: Frame, seen: Observation, bodies: Bodies, parameters: EvidenceParameters
 ) -> bool:
-    """Whether something as large as a body has moved by many pixels since the keyframe, before a camera that
-    stands as it stood then: one that moves with the arm will see better at the next rest."""
-    keyframe, area_min = belief.keyframe, parameters.belief.partition.area_min
-    if camera_span(keyframe.frame, frame) > parameters.rest.camera_span:
+    """Whether something as large as a body has moved by many pixels since the keyframe, and moves on, before a
+    camera that stands as it stood then: one that moves with the arm will see better at the next rest."""
+    assert now.belief is not None
+    assert now.frame is not None
+    keyframe, area_min = now.belief.keyframe, parameters.belief.partition.area_min
+    if now.still_since is not None:
+        return False
+    if any(camera_span(f, frame) > parameters.rest.camera_span for f in (keyframe.frame, now.frame)):
         return False
     far = (bodies.motion > 0) & (seen.span > parameters.span)
     return bool(keyframe.area[far].sum() > area_min * keyframe.pixels_per_metre**2)

@@ -35,7 +35,9 @@ class ArmMotionParameters:
     most_interactions: int = field(default=5, metadata={"least": 0, "most": 1000})
     """Pushes of one run (paper: up to 5)."""
     settle_time: float = 0.25
-    """A push is chosen in a frame taken this long after the arm came to rest, s."""
+    """A push is chosen in a frame taken this long after the arm came to rest, s, ..."""
+    settle_longest: float = 2.0
+    """... or so long after it, s, where it is not decided by then: something may move for ever."""
     rest_tolerance: float = 0.01
     """The arm is at rest where it should be when every joint is this close, rad."""
     null_frames: int = 2
@@ -95,6 +97,7 @@ class ArmMotion(LeafSystem):
             sees, once for a frame.
         pair: FramePair; tells when the frame was taken that decision and mask belong to.
         mask: L_t of the pair's current frame, to tell whether a push brought anything.
+        decided: bool, whether the mask is that of a scene at rest; not wired, every mask is.
         position_measured: the arm's joint angles [7], rad.
 
     Outputs:
@@ -135,6 +138,7 @@ class ArmMotion(LeafSystem):
         self._decision = self.DeclareAbstractInputPort("decision", AbstractValue.Make(UNDECIDED))
         self._pair = self.DeclareAbstractInputPort("pair", AbstractValue.Make(NO_PAIR))
         self._mask = self.DeclareAbstractInputPort("mask", AbstractValue.Make(NO_MASK))
+        self._decided = self.DeclareAbstractInputPort("decided", AbstractValue.Make(True))
         self._measured = self.DeclareVectorInputPort("position_measured", 7)
         self._memory = self.DeclareAbstractState(AbstractValue.Make(_Memory()))
         state = {self.abstract_state_ticket(self._memory)}
@@ -203,7 +207,9 @@ class ArmMotion(LeafSystem):
         if memory.rest_since is None:
             return replace(memory, rest_since=time)
         pair: FramePair = self._pair.Eval(context)
-        if pair is NO_PAIR or pair.current.time < memory.rest_since + parameters.settle_time:
+        decided = not self._decided.HasValue(context) or self._decided.Eval(context)
+        settle = parameters.settle_time if decided else parameters.settle_longest
+        if pair is NO_PAIR or pair.current.time < memory.rest_since + settle:
             return memory
         if memory.unjudged is not NO_PUSH:
             return self._judge(memory, pair, context)

@@ -29,6 +29,8 @@ class MaskPropagator(LeafSystem):
     Outputs:
         mask: L_t [H, W] uint16, 0 = background.
         settled_mask: the same without the objects that may be two, for whoever plans pushes.
+        decided: bool, whether the scene is at rest and the mask that of this rest; what comes while something
+            moves may change then.
         segmentation: Segmentation, the ids, also of objects out of sight, where they are remembered, and the
             confidence of each.
     """
@@ -72,6 +74,12 @@ class MaskPropagator(LeafSystem):
             "settled_mask",
             AbstractValue.Make(NO_MASK).Clone,
             lambda context, output: output.set_value(self._segmentation(context).settled_mask),
+            prerequisites_of_calc={self.all_state_ticket()},
+        )
+        self.DeclareAbstractOutputPort(
+            "decided",
+            AbstractValue.Make(True).Clone,
+            lambda context, output: output.set_value(self._segmentation(context).decided),
             prerequisites_of_calc={self.all_state_ticket()},
         )
         self.DeclareAbstractOutputPort(

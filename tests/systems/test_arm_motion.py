@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
-from pydrake.common.value import AbstractValue
+from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import VectorLogSink
@@ -54,6 +54,8 @@ class Script:
     pushes: list
     null: Decision = NOTHING_LEFT
     ids_after: list = field(default_factory=lambda: [0] * 9)
+    undecided: tuple[float, float] = (0.0, 0.0)
+    """From when to when the scene is not at rest, s."""
     asked: list = field(default_factory=list)
 
 
@@ -79,6 +81,10 @@ class Eyes(LeafSystem):
             number = script.ids_after[step.Eval(context)]
             output.set_value(np.full((4, 4), number, np.uint16))
 
+        def decided(context, output):
+            start, end = script.undecided
+            output.set_value(not start <= context.get_time() < end)
+
         def decision(context, output):
             script.asked.append((context.get_time(), frame(context).time))
             done = step.Eval(context)
@@ -89,6 +95,7 @@ class Eyes(LeafSystem):
         for name, model, calc in (
             ("pair", NO_PAIR, pair),
             ("mask", NO_MASK, mask),
+            ("decided", True, decided),
             ("decision", UNDECIDED, decision),
         ):
             self.DeclareAbstractOutputPort(
@@ -101,7 +108,7 @@ def wired(script, parameters=None, way_back=None):
     builder = DiagramBuilder()
     motion = builder.AddSystem(ArmMotion(Q_OBSERVE, parameters, way_back=way_back))
     eyes = builder.AddSystem(Eyes(script))
-    for name in ("pair", "mask", "decision"):
+    for name in ("pair", "mask", "decided", "decision"):
         builder.Connect(eyes.GetOutputPort(name), motion.GetInputPort(name))
     builder.Connect(motion.GetOutputPort("interaction_step"), eyes.GetInputPort("interaction_step"))
     builder.Connect(motion.GetOutputPort("position"), motion.GetInputPort("position_measured"))
@@ -177,6 +184,30 @@ def test_push_is_asked_for_only_in_frames_taken_after_the_arm_came_to_rest():
         assert frame_time >= 0.3 - 1e-9
         assert len(before) == 0 or frame_time >= before[-1] + 0.3 - 0.01
     assert len(script.asked) == 4  # two pushes, and null twice
+
+
+@pytest.mark.parametrize(("until", "asked_from"), [(1.0, 1.0), (99.0, 2.0)])
+def test_no_push_is_chosen_while_the_scene_moves_unless_it_does_so_for_long(until, asked_from):
+    script = Script([push_to(THERE)], undecided=(0.0, until))
+    run(script, 4.0)
+    first, _ = script.asked[0]
+    assert asked_from <= first < asked_from + 0.15
+
+
+def test_without_a_word_on_rest_every_mask_counts():
+    motion = ArmMotion(Q_OBSERVE)
+    simulator = Simulator(motion)
+    context = simulator.get_mutable_context()
+    frame = Frame(5, 0.4, CAMERA, None, np.ones((4, 4), np.float32), np.eye(4), np.zeros((4, 4), bool))
+    for name, value in {
+        "decision": Decision(push_to(THERE), unsettled_area=0.01),
+        "pair": FramePair(frame, frame),
+        "mask": np.zeros((4, 4), np.uint16),
+    }.items():
+        motion.GetInputPort(name).FixValue(context, Value[object](value))
+    motion.GetInputPort("position_measured").FixValue(context, Q_OBSERVE)
+    simulator.AdvanceTo(0.5)
+    assert motion.GetOutputPort("active_push").Eval(context) is not NO_PUSH
 
 
 def test_most_interactions_end_the_run():
