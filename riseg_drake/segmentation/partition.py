@@ -8,6 +8,10 @@ from numpy.typing import NDArray
 
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.multicut import loss, multicut
+from riseg_drake.segmentation.potts import PottsGraph, potts_labels
+
+_NEVER = 1e3
+"""Nats that a superpixel would cost in a part that is not beside its own."""
 
 
 @dataclass
@@ -40,9 +44,48 @@ def partition(
     """
     weight = bond * keyframe.length
     part = multicut(keyframe.count, keyframe.borders, weight, nats, parameters.rigid_min)
+    if nats is not None and len(nats) > 1:
+        part = redrawn(part, keyframe.borders, weight, nats, parameters)
     return _without_small(
         part, keyframe.borders, weight, keyframe.area, parameters.area_min * keyframe.pixels_per_metre**2
     )
+
+
+def redrawn(
+    part: NDArray[np.intp],
+    borders: NDArray[np.intp],
+    weight: NDArray[np.float64],
+    nats: NDArray[np.float64],
+    parameters: PartitionParameters,
+) -> NDArray[np.intp]:
+    """The parts [N], with the outlines between those of unlike motions where all superpixels' costs have them.
+
+    Near a contact two motions are nearly alike, so that the two sides of a border say little of it; all that
+    lies between that border and the true one says more.
+
+    Args:
+        part: [N], 0.., of each superpixel.
+        borders: [M, 2], pairs of superpixels that touch.
+        weight: [M], nats that it brings not to cut each border.
+        nats: [G, N], how badly each motion explains each superpixel.
+        parameters: see there.
+    """
+    motion = motions_of_parts(part, nats, parameters)
+    own = np.eye(len(motion), dtype=bool)
+    beside = np.zeros_like(own)
+    beside[part[borders[:, 0]], part[borders[:, 1]]] = True
+    may_be = own | ((beside | beside.T) & (motion[:, None] != motion))
+    unary = np.where(may_be[:, part], nats[motion], _NEVER)
+    graph = PottsGraph(len(part), borders, np.maximum(weight, 0.0))
+    label, _ = potts_labels(unary.astype(np.float32), graph)
+
+    def energy(label: NDArray[np.intp]) -> float:
+        cut = label[borders[:, 0]] != label[borders[:, 1]]
+        return float(weight[cut].sum() + nats[motion[label], np.arange(len(label))].sum())
+
+    if energy(label) >= energy(part):
+        return part
+    return np.unique(label, return_inverse=True)[1]
 
 
 def apart(

@@ -9,6 +9,7 @@ from riseg_drake.segmentation.partition import (
     margins,
     motions_of_parts,
     partition,
+    redrawn,
     with_ids,
 )
 
@@ -72,6 +73,27 @@ def test_a_part_moves_where_two_sure_superpixels_say_so():
     nats = np.array([[4.0, 4.1, 0.0, 4.0, 3.9], [0.0] * 5])
     motion = motions_of_parts(np.array([0, 0, 0, 1, 1]), nats, PartitionParameters())
     np.testing.assert_array_equal(motion, [1, 0])
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_an_outline_goes_where_the_motions_part_and_not_where_the_picture_does(mirrored):
+    # 0 and 1 did the first, 2 to 4 the second: 2 says so by 3 nats, and to cut there costs only 1 more.
+    nats = np.array([[0.0, 0.0, 3.0, 20.0, 20.0], [20.0, 20.0, 0.0, 0.0, 0.0]])
+    weight, part, right = np.array([5.0, 0.5, -0.5, 5.0]), np.array([0, 0, 0, 1, 1]), [0, 0, 1, 1, 1]
+    if mirrored:
+        nats, weight, part, right = nats[:, ::-1], weight[::-1], 1 - part[::-1], [0, 0, 0, 1, 1]
+    row, parameters = Row(), PartitionParameters()
+    np.testing.assert_array_equal(redrawn(part, row.borders, weight, nats, parameters), right)
+    # 4 nats more for the cut are too many.
+    weight = np.where(weight == 0.5, 4.5, weight)
+    np.testing.assert_array_equal(redrawn(part, row.borders, weight, nats, parameters), part)
+
+
+def test_parts_of_one_motion_keep_their_outline():
+    nats = np.array([[9.0] * 5, [0.0] * 5])
+    part = np.array([0, 0, 0, 1, 1])
+    bond = np.array([-1.0, -9.0, 9.0, -1.0])
+    np.testing.assert_array_equal(redrawn(part, Row().borders, bond, nats, PartitionParameters()), part)
 
 
 def test_a_part_has_the_one_motion_that_explains_all_of_it():
