@@ -19,6 +19,7 @@ from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pushing.decision import UNDECIDED, Decision, Ending
 from riseg_drake.pushing.push import NO_PUSH, ArmPhase, Push
 from riseg_drake.segmentation.segmentation import Segmentation
+from riseg_drake.segmentation.untouched import untouched_clusters
 from riseg_drake.systems.stage_clock import StageClock
 
 Listener = Callable[[Frame, Context], None]
@@ -237,6 +238,8 @@ class _Book:
             depth=frame.depth,
             mask=mask,
             confidence=segmentation.confidence,
+            untouched=untouched_clusters(segmentation),
+            untouched_confidence=segmentation.untouched_confidence,
             frames=self._frames,
             stage_seconds={stage: tuple(times) for stage, times in self._clock.seconds.items()},
             ground_truth=truth.labels if truth else None,

@@ -1,7 +1,8 @@
 """The folder a run leaves behind: pictures and masks of every step, and a summary of them all.
 
     summary.json
-    step_0/ color.png  depth.png  mask.png  overlay.png  ground_truth.png  (with a SAM: refined.png)
+    step_0/ color.png  depth.png  mask.png  untouched.png  overlay.png  ground_truth.png
+            (with a SAM: refined.png)
     step_1/ ...
 
 Whenever the run is stopped, every step that the summary lists is there, and whole.
@@ -49,6 +50,10 @@ class Step:
     """Camera frames since the last step."""
     confidence: Mapping[int, float] = field(default_factory=dict)
     """Of each id that was decided on the probability that it is one object and all of it."""
+    untouched: NDArray[np.uint16] | None = None
+    """Clusters of depth among what has not moved yet [H, W], 0 elsewhere: guessed, and no ids."""
+    untouched_confidence: float = 0.0
+    """In each of them, of the same kind as that in ids."""
     stage_seconds: Mapping[str, Sequence[float]] = field(default_factory=dict)
     """Wall time of every call since the last step, by stage, s."""
     ground_truth: NDArray[np.uint16] | None = None
@@ -91,6 +96,8 @@ class RunFolder:
                 write_png(unfinished / "color.png", step.color)
                 write_png(unfinished / "depth.png", depth_to_millimetres(step.depth))
                 write_png(unfinished / "mask.png", step.mask.astype(np.uint16))
+                if step.untouched is not None:
+                    write_png(unfinished / "untouched.png", step.untouched)
                 write_png(
                     unfinished / "overlay.png", draw_masks(step.color, step.mask, confidence=step.confidence)
                 )
@@ -155,6 +162,9 @@ def _step_to_json(step: Step) -> dict[str, Any]:
         "confidence": confidence_figures(step.confidence),
         "stages": stage_figures(step.stage_seconds),
     }
+    if step.untouched is not None:
+        clusters = range(1, int(step.untouched.max()) + 1)
+        content["untouched"] = confidence_figures(dict.fromkeys(clusters, step.untouched_confidence))
     if step.scores is not None:
         content["scores"] = step.scores.as_dict()
     if step.refined_scores is not None:

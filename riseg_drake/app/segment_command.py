@@ -29,6 +29,7 @@ from riseg_drake.host.terminal import one_line
 from riseg_drake.recording import layout
 from riseg_drake.recording.layout import LeftOut, RecordedFrame, RecordingError
 from riseg_drake.recording.reader import RecordingReader
+from riseg_drake.segmentation.untouched import untouched_clusters
 from riseg_drake.systems.stage_clock import StageClock
 
 MOST_LINES = 10
@@ -137,6 +138,7 @@ def _segment(
         raise RecordingError(
             f"{reader.folder}: no frame shows a table top; the first: {result.left_out[-1].why}"
         )
+    folder.write_untouched(untouched_clusters(replay.segmentation))
 
 
 def _take(

@@ -2,6 +2,7 @@
 
     summary.json            how it went, what was left out, and the scores where there are true labels
     mask/                   L_t of every frame, 16 bit PNG, named as the colour image it belongs to
+    untouched.png           of the last frame what has not moved yet, as clusters of depth: guessed, and no ids
     overlay.mp4             every frame with its objects tinted and numbered
     scores.csv              the ten figures of every frame with a true label
 
@@ -25,13 +26,14 @@ from riseg_drake.pictures.masks import draw_masks
 from riseg_drake.recording.whole_file import GrowingText, write_png
 
 MASKS = "mask"
+UNTOUCHED = "untouched.png"
 VIDEO = "overlay.mp4"
 SCORES = "scores.csv"
 COMMAND = "segment"
 LONGEST_NAME = 50
 """Characters of a mask's name: as many bytes as any file system takes, whatever they are."""
 _UNFINISHED_VIDEO = ".overlay.unfinished.mp4"  # OpenCV goes by the ending
-PARTS = "|".join(map(re.escape, (MASKS, VIDEO, SCORES, _UNFINISHED_VIDEO)))
+PARTS = "|".join(map(re.escape, (MASKS, UNTOUCHED, VIDEO, SCORES, _UNFINISHED_VIDEO)))
 """What a segmentation puts into its folder, beside the summary."""
 
 
@@ -72,6 +74,11 @@ class SegmentFolder:
             if scores is not None:
                 self._write_scores(file, scores)
         self._show(draw_masks(color, mask, confidence=confidence))
+
+    def write_untouched(self, clusters: NDArray[np.uint16]) -> None:
+        """Write what the last frame shows that has not moved yet, [H, W]."""
+        with self._folder.writing():
+            write_png(self.path / UNTOUCHED, clusters)
 
     def note(self, **entries: Any) -> None:
         """Enter something in the summary."""

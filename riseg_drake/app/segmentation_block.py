@@ -41,7 +41,7 @@ class SegmentationBlock:
     """Those of FrameView: the keys of STATION_PORTS where all follows from the joint angles."""
     outputs: dict[str, OutputPort]
     """`pair`, `above_table`, `expected_flow`, `optical_flow`, `groups`, `mask`, `settled_mask`,
-    `decided`, `segmentation`."""
+    `decided`, `untouched`, `segmentation`."""
 
 
 def panda_view(scenario: Scenario, kinematics: PandaKinematics) -> FrameView:
@@ -104,6 +104,7 @@ def add_stages(
         "mask": propagator,
         "settled_mask": propagator,
         "decided": propagator,
+        "untouched": propagator,
         "segmentation": propagator,
     }
     return SegmentationBlock(

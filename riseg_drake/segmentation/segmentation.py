@@ -54,7 +54,12 @@ class Segmentation(Immutable):
     @property
     def confidence(self) -> dict[int, float]:
         """For each id the probability, by the margin, that it is one object and all of it."""
-        return {a: float(1 / (1 + np.exp(self.settled - 2 * margin))) for a, margin in self.margin.items()}
+        return {a: self._sure(margin) for a, margin in self.margin.items()}
+
+    @property
+    def untouched_confidence(self) -> float:
+        """The same, a probability, of a thing of which motion has said nothing."""
+        return self._sure(0.0)
 
     @property
     def object_ids(self) -> tuple[int, ...]:
@@ -64,6 +69,9 @@ class Segmentation(Immutable):
             newest = self.bodies[max(self.bodies)].body if self.bodies else self.belief.body
             ids |= set(np.unique(newest[newest > 0]).tolist())
         return tuple(sorted(int(a) for a in ids))
+
+    def _sure(self, margin: float) -> float:
+        return float(1 / (1 + np.exp(self.settled - 2 * margin)))
 
 
 def nothing_segmented(shape: tuple[int, int]) -> Segmentation:

@@ -10,6 +10,7 @@ from riseg_drake.segmentation.bfif import BFIFParameters, no_groups
 from riseg_drake.segmentation.optical_flow import NO_FLOW
 from riseg_drake.segmentation.segment import SegmentParameters, segment
 from riseg_drake.segmentation.segmentation import Segmentation, nothing_segmented
+from riseg_drake.segmentation.untouched import untouched_clusters
 from riseg_drake.systems.stage_clock import timed
 
 
@@ -31,6 +32,7 @@ class MaskPropagator(LeafSystem):
         settled_mask: the same without the objects that may be two, for whoever plans pushes.
         decided: bool, whether the scene is at rest and the mask that of this rest; what comes while something
             moves may change then.
+        untouched: [H, W] uint16, clusters of depth among what has not moved yet, guessed; no ids.
         segmentation: Segmentation, the ids, also of objects out of sight, where they are remembered, and the
             confidence of each.
     """
@@ -80,6 +82,12 @@ class MaskPropagator(LeafSystem):
             "decided",
             AbstractValue.Make(True).Clone,
             lambda context, output: output.set_value(self._segmentation(context).decided),
+            prerequisites_of_calc={self.all_state_ticket()},
+        )
+        self.DeclareAbstractOutputPort(
+            "untouched",
+            AbstractValue.Make(NO_MASK).Clone,
+            lambda context, output: output.set_value(untouched_clusters(self._segmentation(context))),
             prerequisites_of_calc={self.all_state_ticket()},
         )
         self.DeclareAbstractOutputPort(

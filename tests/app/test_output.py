@@ -21,6 +21,8 @@ def step(number):
         mask=mask,
         frames=7,
         confidence={300: 0.98765, 7: 0.5},
+        untouched=np.where(mask > 0, np.uint16(0), np.uint16(2)),
+        untouched_confidence=0.119,
         stage_seconds={"OpticalFlow": [0.010, 0.012, 0.014]},
         ground_truth=mask,
         scores=score(mask, mask),
@@ -41,6 +43,7 @@ def test_a_step_is_written_in_the_form_that_was_promised(tmp_path):
     folder = tmp_path / "run" / "step_0"
     np.testing.assert_array_equal(read(folder / "color.png"), written.color[..., ::-1])
     np.testing.assert_array_equal(read(folder / "mask.png"), written.mask)
+    np.testing.assert_array_equal(read(folder / "untouched.png"), written.untouched)
     np.testing.assert_array_equal(read(folder / "ground_truth.png"), written.mask)
     depth = read(folder / "depth.png")
     assert depth.dtype == np.uint16
@@ -54,6 +57,7 @@ def test_a_step_is_written_in_the_form_that_was_promised(tmp_path):
     assert entry["frames"] == 7
     assert entry["objects"] == 1
     assert entry["confidence"] == {"7": 0.5, "300": 0.988}
+    assert entry["untouched"] == {"1": 0.119, "2": 0.119}
     assert entry["stages"]["OpticalFlow"] == {"calls": 3, "median_ms": 12.0, "p95_ms": 13.8}
 
 

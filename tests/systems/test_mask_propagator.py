@@ -69,7 +69,7 @@ def test_ports_have_the_names_of_the_contract() -> None:
         "above_table_reference",
         "above_table",
     ]
-    assert outputs == ["mask", "settled_mask", "decided", "segmentation"]
+    assert outputs == ["mask", "settled_mask", "decided", "untouched", "segmentation"]
 
 
 def test_at_first_the_mask_is_empty(payloads, calls) -> None:
