@@ -26,7 +26,7 @@ def test_before_anything_moved_all_are_clusters_with_the_largest_first():
     segmentation, label = seen(known=())
     clusters = untouched_clusters(segmentation)
     for box, cluster in ((2, 1), (1, 2), (3, 3)):
-        assert np.mean(clusters[label == box] == cluster) > 0.95
+        assert np.mean(clusters[label == box] == cluster) > 0.9  # steep sides are cut off
     assert not clusters[label == 0].any()
     assert not segmentation.mask.any()
 
