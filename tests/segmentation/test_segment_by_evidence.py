@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.segmentation.drawn_scene import intersection_over_union
+from tests.segmentation.drawn_scene import DrawnScene, intersection_over_union, looking_down, planar
 from tests.segmentation.watched import Watcher
 
 
@@ -51,3 +51,22 @@ def test_the_same_frames_give_the_same_masks_to_the_byte(watched, pushed) -> Non
     again = Watcher()
     for (frame, _), answer in zip([*pushed, *resting(pushed)], watched[0], strict=True):
         assert again.take(frame).mask.tobytes() == answer.mask.tobytes()
+
+
+def test_what_a_camera_sees_that_creeps_back_to_where_it_was_is_decided_at_its_rest() -> None:
+    scene = DrawnScene([(0.07, 0.06, 0.03), (0.06, 0.08, 0.05)])
+    there, pushed_to = planar(0.08, 0.0), [planar(-0.05, 0.004 * k, 0.3) for k in range(7)]
+    watcher, rng = Watcher(), np.random.default_rng(0)
+    # Away while the box is pushed, and back; the last step but one is 2 pixels long, and ends 1 from the start.
+    xs = [0.0, 0.0, 0.02, 0.04, 0.04, 0.04, 0.04, 0.04, 0.02, 0.004, 0.0008, 0.0008, 0.0008, 0.0008, 0.0008]
+    places = [*[pushed_to[0]] * 3, *pushed_to[1:], *[pushed_to[-1]] * 6]
+    keyframes = []
+    for sequence, (x, place) in enumerate(zip(xs, places, strict=True)):
+        frame, label = scene.frame(sequence, looking_down(x), [place, there], rng)
+        segmentation = watcher.take(frame).segmentation
+        keyframes.append(segmentation.belief.keyframe.frame.sequence)
+    # It stands still from the frame after that step on, and for 0.1 s two frames later.
+    assert keyframes[-6:] == [0, 0, 0, 0, 13, 13]
+    assert segmentation.decided
+    (only,) = segmentation.object_ids
+    assert intersection_over_union(segmentation.mask == only, label == 1) > 0.95
