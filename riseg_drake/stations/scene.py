@@ -109,6 +109,8 @@ def draw_scene(config: SceneConfig, rng: np.random.Generator) -> list[PlacedObje
     restless = ""
     for attempt in range(LAYOUTS):
         if attempt % LAYOUTS_OF_A_CHOICE == 0:
+            if attempt >= LAYOUTS // 2:  # so many of these have no room
+                count = max(kind.count_min, count - 1)
             chosen = [models[i] for i in rng.permutation(len(models))[:count]]
             if config.layout != "spread":  # the large ones first: the others find room about them, and on them
                 chosen.sort(key=lambda model: -float(np.prod(np.ptp(model.footprint.corners(), axis=0))))

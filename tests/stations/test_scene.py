@@ -362,3 +362,8 @@ def test_a_drawn_pile_is_at_rest_inside_the_work_area_and_the_same_again():
     assert is_pile(table.touching(), len(scene))
     for before, after in zip(scene, table.objects(), strict=True):
         assert np.linalg.norm(after.X_WB.translation() - before.X_WB.translation()) < 5e-4
+
+
+def test_where_as_many_as_were_drawn_have_no_room_there_are_fewer():
+    config = SceneConfig(objects="package://riseg_drake_models/household", layout="spread")
+    assert len(draw_scene(config, np.random.default_rng(911))) == 5  # six were drawn, three times in vain
