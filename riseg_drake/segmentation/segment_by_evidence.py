@@ -251,7 +251,10 @@ def _has_gone_far(
 
 
 def _share_in_view(belief: Belief, bodies: Bodies, frame: Frame) -> float:
-    """How much of what the keyframe shows this frame shows with depth, where it should be by now."""
+    """How much of what the keyframe shows this frame shows with depth, where it should be by now.
+
+    In the measure of the keyframe's own holes, which lie elsewhere in each frame: dark things are seen half.
+    """
     keyframe = belief.keyframe
     every = slice(None, None, 1 + len(keyframe.owner) // 2000)
     v, u = keyframe.witnesses.pixel[:, every]
@@ -262,7 +265,8 @@ def _share_in_view(belief: Belief, bodies: Bodies, frame: Frame) -> float:
         p_CQ = move_points(inverse(frame.X_WC) @ keyframe.frame.X_WC @ X, p_KQ[motion == k].astype(float))
         (v, u), inside = (a.T for a in pixels_of(p_CQ, frame.intrinsics))
         shown += int(np.count_nonzero(frame.unhidden_depth[v[inside], u[inside]] > 0))
-    return shown / max(1, len(p_KQ))
+    measured = np.mean(keyframe.frame.depth[keyframe.above.mask] > 0)
+    return shown / max(1.0, len(p_KQ) * float(measured))
 
 
 def _leaves_keyframe(

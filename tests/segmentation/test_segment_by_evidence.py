@@ -53,7 +53,8 @@ def test_the_same_frames_give_the_same_masks_to_the_byte(watched, pushed) -> Non
         assert again.take(frame).mask.tobytes() == answer.mask.tobytes()
 
 
-def test_what_a_camera_sees_that_creeps_back_to_where_it_was_is_decided_at_its_rest() -> None:
+@pytest.mark.parametrize("holes", [0.0, 0.3], ids=["whole", "with holes"])
+def test_what_a_camera_sees_that_creeps_back_to_where_it_was_is_decided_at_its_rest(holes) -> None:
     scene = DrawnScene([(0.07, 0.06, 0.03), (0.06, 0.08, 0.05)])
     there, pushed_to = planar(0.08, 0.0), [planar(-0.05, 0.004 * k, 0.3) for k in range(7)]
     watcher, rng = Watcher(), np.random.default_rng(0)
@@ -63,6 +64,9 @@ def test_what_a_camera_sees_that_creeps_back_to_where_it_was_is_decided_at_its_r
     keyframes = []
     for sequence, (x, place) in enumerate(zip(xs, places, strict=True)):
         frame, label = scene.frame(sequence, looking_down(x), [place, there], rng)
+        # Dark things have holes in depth, others in each frame.
+        missing = (label > 0) & (rng.random(label.shape) < holes)
+        frame = replace(frame, depth=np.where(missing, np.float32(0), frame.depth))
         segmentation = watcher.take(frame).segmentation
         keyframes.append(segmentation.belief.keyframe.frame.sequence)
     # It stands still from the frame after that step on, and for 0.1 s two frames later.
