@@ -42,7 +42,8 @@ def test_a_run_ends_by_itself_and_leaves_a_step_for_every_interaction(finished):
     assert content["ended"] in ("enough_interactions", "nothing_left")
     for i in (0, 1):
         names = {path.name for path in (finished / f"step_{i}").iterdir()}
-        assert names == {"color.png", "depth.png", "mask.png", "overlay.png", "ground_truth.png"}
+        pictures = ("color", "depth", "mask", "untouched", "overlay", "ground_truth")
+        assert names == {f"{picture}.png" for picture in pictures}
 
 
 def test_the_area_that_is_left_at_the_end_is_that_of_what_is_not_segmented(finished):
