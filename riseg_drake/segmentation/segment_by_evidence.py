@@ -218,9 +218,11 @@ def _carried(
     margin = now.margin
     if deciding and seen is not None:
         margin = margins(belief.keyframe, belief.bond + seen.evidence, bodies.body, parameters.belief.partition)
+    # What was decided in motion is looked at once more when it rests.
+    decided = now.decided or (deciding and now.still_since is not None)
     moved = deciding and len(bodies.motions_K) > 1
     if not above.mask.any() or not (moved or _leaves_keyframe(belief, bodies, frame, above, parameters)):
-        return replace(now, margin=margin, decided=now.decided or deciding)
+        return replace(now, margin=margin, decided=decided)
     memory: Memory = {}
     if parameters.memory:
         label_K = belief.keyframe.image_of(bodies.body.astype(np.uint16))
@@ -229,9 +231,7 @@ def _carried(
     # The pair's reference, from which the next groups tell, may be older than the new keyframe.
     seen_so_far = {pair.reference.sequence: standing(belief), **now.bodies}
     since = {s: rebased(b, bodies, belief.keyframe, following) for s, b in seen_so_far.items()}
-    return replace(
-        now, margin=margin, belief=following, bodies=since, memory=memory, decided=now.decided or deciding
-    )
+    return replace(now, margin=margin, belief=following, bodies=since, memory=memory, decided=decided)
 
 
 def _has_gone_far(

@@ -40,6 +40,8 @@ def test_before_a_still_camera_what_went_far_is_decided_and_the_frame_becomes_th
     keyframes = [answer.belief.keyframe.frame.sequence for answer in answers]
     # After 15 pixels of motion; in the rest after that nothing is new.
     assert keyframes == [0] * 19 + [19] * 4
+    assert not answers[19].decided  # to be looked at once more at its rest
+    assert answers[-1].decided
     (only,) = set(np.unique(answers[-1].mask)) - {0}
     assert intersection_over_union(answers[-1].mask == only, truths[-1] == 1) > 0.95
     assert answers[-1].object_ids == (only,)
