@@ -8,15 +8,12 @@ from riseg_drake.segmentation.propagation import UNKNOWN
 from riseg_drake.segmentation.segmentation import Segmentation
 
 
-def untouched_clusters(
-    segmentation: Segmentation, parameters: DepthClusterParameters | None = None
-) -> NDArray[np.uint16]:
+def untouched_clusters(segmentation: Segmentation) -> NDArray[np.uint16]:
     """Clusters [H, W] of what has not moved yet, in the last frame: 1 is the largest, 0 all else.
 
     They are numbered anew in each frame, and are no ids: a first guess for who can't wait.
     """
-    nothing = np.zeros(segmentation.label.shape, np.uint16)
     if segmentation.frame is None:
-        return nothing
+        return np.zeros(segmentation.label.shape, np.uint16)
     frame, unknown = segmentation.frame, segmentation.label == UNKNOWN
-    return depth_clusters(frame.depth, unknown, frame.intrinsics, parameters or DepthClusterParameters())
+    return depth_clusters(frame.depth, unknown, frame.intrinsics, DepthClusterParameters())

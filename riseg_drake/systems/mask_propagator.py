@@ -1,5 +1,8 @@
 """Segment (Alg. 2, line 7) as a system, and the one place where L_t-1 is kept."""
 
+from collections.abc import Callable
+from typing import Any
+
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
@@ -63,38 +66,23 @@ class MaskPropagator(LeafSystem):
                 ("above_table", NOTHING_ABOVE_TABLE),
             )
         )
-        nothing = AbstractValue.Make(nothing_segmented(intrinsics.shape))
-        self._state = self.DeclareAbstractState(nothing)
+        nothing = nothing_segmented(intrinsics.shape)
+        self._state = self.DeclareAbstractState(AbstractValue.Make(nothing))
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, offset, self._update)
+        self._declare("mask", NO_MASK, lambda segmentation: segmentation.mask)
+        self._declare("settled_mask", NO_MASK, lambda segmentation: segmentation.settled_mask)
+        self._declare("decided", True, lambda segmentation: segmentation.decided)
+        self._declare("untouched", NO_MASK, untouched_clusters)
+        self._declare("segmentation", nothing, lambda segmentation: segmentation)
+
+    def _declare(self, name: str, model: Any, read: Callable[[Segmentation], Any]) -> None:
+        """An output that shows something of L_t."""
+
+        def calc(context: Context, output: AbstractValue) -> None:
+            output.set_value(read(self._segmentation(context)))
+
         self.DeclareAbstractOutputPort(
-            "mask",
-            AbstractValue.Make(NO_MASK).Clone,
-            lambda context, output: output.set_value(self._segmentation(context).mask),
-            prerequisites_of_calc={self.all_state_ticket()},
-        )
-        self.DeclareAbstractOutputPort(
-            "settled_mask",
-            AbstractValue.Make(NO_MASK).Clone,
-            lambda context, output: output.set_value(self._segmentation(context).settled_mask),
-            prerequisites_of_calc={self.all_state_ticket()},
-        )
-        self.DeclareAbstractOutputPort(
-            "decided",
-            AbstractValue.Make(True).Clone,
-            lambda context, output: output.set_value(self._segmentation(context).decided),
-            prerequisites_of_calc={self.all_state_ticket()},
-        )
-        self.DeclareAbstractOutputPort(
-            "untouched",
-            AbstractValue.Make(NO_MASK).Clone,
-            lambda context, output: output.set_value(untouched_clusters(self._segmentation(context))),
-            prerequisites_of_calc={self.all_state_ticket()},
-        )
-        self.DeclareAbstractOutputPort(
-            "segmentation",
-            nothing.Clone,
-            lambda context, output: output.set_value(self._segmentation(context)),
-            prerequisites_of_calc={self.all_state_ticket()},
+            name, AbstractValue.Make(model).Clone, calc, prerequisites_of_calc={self.all_state_ticket()}
         )
 
     def _segmentation(self, context: Context) -> Segmentation:
