@@ -1,10 +1,11 @@
 """The folder a run leaves behind: pictures and masks of every step, and a summary of them all.
 
     summary.json
-    step_0/ color.png  depth.png  mask.png  untouched.png  overlay.png  ground_truth.png  (with a SAM: refined.png)
+    step_0/ color.png  depth.png  mask.png  untouched.png  overlay.png  ground_truth.png  refined.png
     step_1/ ...
 
-Whenever the run is stopped, every step that the summary lists is there, and whole.
+`refined.png` is there with a SAM, `ground_truth.png` where the truth is known. Whenever the run is
+stopped, every step that the summary lists is there, and whole.
 """
 
 import re
