@@ -19,12 +19,16 @@ from riseg_drake.geometry.plane import (
 from riseg_drake.geometry.rgbd import Frame, Immutable
 from riseg_drake.segmentation.table_extent import TableExtentParameters, on_this_table
 
-_COLOR_SPREAD_MIN = 4.0
-"""Gray levels; a table's colour is not known better than that."""
 _DEPTH_NOISE_MIN = 2.0e-4
 """m at 1 m; a rendered depth without noise is taken for no better than that: pixels still are of some size."""
-_TABLE_SIGMAS = 4.0
-"""A colour further than that many standard deviations from the table's, in any channel, is not the table's."""
+_EVERY = 2
+"""Pixels between those that are asked what is around them, ..."""
+_AROUND = (9, 9)
+"""... so many of which lend their colour: dark patches are about half as wide."""
+_ALIKE = 0.5
+"""Of its squared distance from the table's colour, at which a colour is a thing's."""
+_FEW = 0.05
+"""Share of what is around a pixel that must be a thing for it to be of that thing."""
 
 
 @dataclass
@@ -96,7 +100,7 @@ def objects_above_table(frame: Frame, parameters: AboveTableParameters) -> Above
     distance = float(np.median(z)) if len(z) else 1.0
     with np.errstate(invalid="ignore"):
         raised = height > 0.5 * parameters.height_min
-    mask = _without_specks(high, raised, clearly, frame, on_table, parameters.area_min / distance**2)
+    mask = _without_specks(high, raised, clearly, frame, parameters.area_min / distance**2)
     return AboveTable(mask, height, transform_plane(frame.X_WC, plane_C), depth_noise, distance)
 
 
@@ -140,36 +144,24 @@ def _high(
         return high, high & (height > clear * z_squared)
 
 
-def _looks_like_table(color: NDArray[np.uint8], frame: Frame, on_table: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which of N colours [N, 3] may be the table's, given which of the frame's every fifth pixel are."""
-    if np.count_nonzero(on_table) < 100:
-        return np.ones(len(color), bool)
-    mean, spread = cv2.meanStdDev(np.ascontiguousarray(frame.color[_every(5)]), mask=on_table.view(np.uint8))
-    reach = _TABLE_SIGMAS * np.maximum(spread, _COLOR_SPREAD_MIN)
-    return (np.abs(color - mean[:, 0]) <= reach[:, 0]).all(1)
-
-
 def _without_specks(
     mask: NDArray[np.bool_],
     raised: NDArray[np.bool_],
     clearly: NDArray[np.bool_] | None,
     frame: Frame,
-    on_table: NDArray[np.bool_],
     area_min: float,
 ) -> NDArray[np.bool_]:
-    """Close pinholes, add the rim and what is enclosed without depth or `raised` above the table (low things
-    have pixels that noise makes lower), drop pieces that look smaller than `area_min` (m^2 at 1 m), or of
-    which less than that rises clearly."""
+    """Close pinholes, add what has no depth and a thing's colour, or is enclosed without depth or `raised`
+    above the table (low things have pixels that noise makes lower), drop pieces that look smaller than
+    `area_min` (m^2 at 1 m), or of which less than that rises clearly."""
     out = np.zeros_like(mask)
     if not mask.any():
         return out
     region = bounding_region(mask, margin=2)
     robot, depth, color = frame.robot[region], frame.depth[region], frame.color[region]
     closed = cv2.morphologyEx(mask[region].astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    # Stereo has no depth on the last pixels before an edge, nor on the first behind it. Colour tells which
-    # are the object's, where the table has a colour of its own.
-    rim = np.nonzero((cv2.dilate(closed, np.ones((3, 3), np.uint8)) > closed) & (depth == 0))
-    closed[rim] = ~_looks_like_table(color[rim], frame, on_table)
+    missing = np.nonzero((depth == 0) & (closed == 0) & ~robot)
+    closed[missing] = _colored_like_things(missing, color, mask[region], (depth > 0) & (closed == 0) & ~robot)
     closed |= _enclosed(((depth == 0) | raised[region]) & (closed == 0), closed)
     np.copyto(closed, 0, where=robot)
     number, label, stats, _ = cv2.connectedComponentsWithStats(closed, connectivity=4)
@@ -180,6 +172,29 @@ def _without_specks(
     keep[0] = False
     out[region] = keep.take(label)
     return out
+
+
+def _colored_like_things(
+    vu: tuple[NDArray[np.intp], ...],
+    color: NDArray[np.uint8],
+    thing: NDArray[np.bool_],
+    table: NDArray[np.bool_],
+) -> NDArray[np.bool_]:
+    """Which of N pixels look like the `thing` [H, W] around them rather than the `table` around them.
+
+    Stereo has no depth on the last pixels before an edge nor on the first behind it, and none in patches of
+    what is dark: colour tells which are the thing's. That around them, as light and shadow are not everywhere
+    the same.
+    """
+    own = color[vu].astype(np.float32)
+    off, share = [], []
+    for which in (thing, table):
+        weight = which[_every(_EVERY)].astype(np.float32)
+        total = cv2.blur(color[_every(_EVERY)] * weight[..., None], _AROUND)
+        share.append(cv2.blur(weight, _AROUND)[vu[0] // _EVERY, vu[1] // _EVERY])
+        mean = total[vu[0] // _EVERY, vu[1] // _EVERY] / np.maximum(share[-1], 1e-6)[:, None]
+        off.append(((own - mean) ** 2).sum(-1))
+    return (share[0] > _FEW) & ((off[0] < _ALIKE * off[1]) | (share[1] < _FEW / 10))
 
 
 def _enclosed(holes: NDArray[np.bool_], around: NDArray[np.uint8]) -> NDArray[np.bool_]:

@@ -92,6 +92,25 @@ def test_pixels_without_depth_are_not_above_the_table_and_have_no_height() -> No
     assert np.isfinite(above.height[~hole]).all()
 
 
+BLACK, LIT, SHADED = 30, 160, 110
+
+
+@pytest.mark.parametrize("thing", [BLACK, 230], ids=["black", "white"])
+def test_where_depth_is_missing_colour_tells_what_is_the_thing_and_what_the_table_beside_it(thing: int) -> None:
+    frame, label = DrawnScene([(0.08, 0.08, 0.04)]).frame(0, looking_down(), [planar(0, 0)])
+    v, u = np.nonzero(label)
+    left, top, bottom = u.min(), v.min(), v.max()
+    # In shadow on its left, where the second imager does not look; bays without depth go from there into it.
+    color = np.where(label[..., None] > 0, thing, LIT).astype(np.uint8).repeat(3, -1)
+    color[top : bottom + 1, left - 12 : left] = SHADED
+    depth = frame.depth.copy()
+    depth[top + 4 : bottom - 4 : 12, left - 6 : left + 8] = 0
+    depth[top + 5 : bottom - 4 : 12, left - 6 : left + 8] = 0
+    depth[top + 6 : bottom - 4 : 12, left - 6 : left + 8] = 0
+    above = objects_above_table(replace(frame, color=color, depth=depth), AboveTableParameters())
+    np.testing.assert_array_equal(above.mask[depth == 0], label[depth == 0] > 0)
+
+
 def test_specks_are_no_objects() -> None:
     frame, _ = DrawnScene([]).frame(0, looking_down(), [], np.random.default_rng(7))
     frame.depth[50:52, 60:62] -= 0.03
