@@ -29,7 +29,7 @@ class BorderPriorParameters:
     color: float = -0.045
     """For each gray level of colour difference, up to 60."""
     hole: float = -1.6
-    """For the share of its pixels without depth."""
+    """For the share of its pixels without depth, as far as that is more than the share on both sides."""
     most: float = 2.0
     """A still picture proves nothing: log-odds, nats, are no more than that, ..."""
     least: float = -1.5
@@ -50,11 +50,11 @@ def border_prior(keyframe: Keyframe, parameters: BorderPriorParameters) -> NDArr
 
 
 def border_cues(keyframe: Keyframe) -> NDArray[np.float64]:
-    """[M, 5]: step, dent and valley, mm; colour difference, gray levels; share without depth; means along each
-    border, saturated."""
+    """[M, 5]: step, dent and valley, mm; colour difference, gray levels; share without depth, beyond that of
+    both sides; means along each border, saturated."""
     region, count, borders = keyframe.region, keyframe.count, keyframe.borders
     label = keyframe.superpixels.label
-    height = cv2.medianBlur(np.nan_to_num(keyframe.above.height[region]), 5)
+    height = cv2.medianBlur(keyframe.height, 5)
     color = cv2.GaussianBlur(keyframe.frame.color[region], (0, 0), 1.0).astype(np.float32)
     measured = keyframe.frame.depth[region] > 0
     code = borders[:, 0] * count + borders[:, 1]  # rising, as the superpixels list them
@@ -83,4 +83,7 @@ def border_cues(keyframe: Keyframe) -> NDArray[np.float64]:
             total += np.bincount(border, np.maximum(cue, 0), len(borders))
         pixels += np.bincount(border, minlength=len(borders))
     means = (sums / np.maximum(pixels, 1)).T
+    # What is dark has holes everywhere, of which none tells where it ends.
+    without = np.bincount(label[label >= 0], ~measured[label >= 0], count) / np.maximum(keyframe.area, 1)
+    means[:, -1] = np.maximum(means[:, -1] - without[borders].mean(1), 0)
     return np.minimum(means, [10.0, 10.0, 10.0, 60.0, 1.0])

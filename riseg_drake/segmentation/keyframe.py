@@ -16,6 +16,8 @@ from riseg_drake.segmentation.surface import SurfacePixels, surface_pixels
 
 _RIM = np.ones((5, 5), np.uint8)
 """Two pixels on each side of an outline are blurred, interpolated across it, or without true depth."""
+_PINHOLE = np.ones((3, 3), np.uint8)
+"""A larger hole in depth is mostly an outline's."""
 
 
 @dataclass
@@ -24,8 +26,8 @@ class KeyframeParameters:
 
     superpixel: float = 0.006
     """m on the object; size of the superpixels, each of which is taken to lie on one body."""
-    edge_pixels: int = 2000
-    """At most so many pixels with a gradient sharpen motions."""
+    edge_pixels: int = 6000
+    """At most so many pixels sharpen motions."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,8 @@ class Keyframe(Immutable):
     above: AboveTable
     region: Region
     """The part of the view that is cut: all that stands there."""
+    height: NDArray[np.float32]
+    """Of the region, m above the table; what stands there without depth is as high as what is nearest."""
     superpixels: Superpixels
     """Of the region."""
     area: NDArray[np.intp]
@@ -93,19 +97,22 @@ def make_keyframe(
     """Cut what stands on the table of a frame; known borders between bodies [H, W] cut, too."""
     region = bounding_region(above.mask)
     size = max(3, round(parameters.superpixel * above.pixels_per_metre(frame.intrinsics)))
-    cut = superpixels(frame.color[region], above.height[region], above.mask[region], size)
+    height = _filled(above.height[region], above.mask[region])
+    cut = superpixels(frame.color[region], height, above.mask[region], size)
     if bodies is not None:
         cut = split_superpixels(cut, bodies[region])
     owner = np.full(above.mask.shape, -1, np.intp)
     owner[region] = cut.label
     variance = gray_variance(frame.gray, noise)
-    core = cv2.erode((owner >= 0).astype(np.uint8), _RIM, borderValue=0) > 0
+    measured = cv2.morphologyEx((frame.depth > 0).view(np.uint8), cv2.MORPH_CLOSE, _PINHOLE)
+    core = cv2.erode(measured * (owner >= 0).view(np.uint8), _RIM, borderValue=0) > 0
     witnesses = surface_pixels(core, frame.depth, frame.intrinsics)
     v, u = witnesses.pixel
     return Keyframe(
         frame=frame,
         above=above,
         region=region,
+        height=height,
         superpixels=cut,
         area=np.bincount(cut.label[cut.label >= 0], minlength=cut.count),
         witnesses=witnesses,
@@ -115,3 +122,17 @@ def make_keyframe(
         gradient_squared=(variance[v, u] - np.float32(2 * noise.color**2)) / np.float32(noise.registration**2),
         edges=edge_pixels(frame, owner, has_contrast(variance, noise), variance, parameters.edge_pixels),
     )
+
+
+def _filled(height: NDArray[np.float32], inside: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Heights [H, W] without NaN: inside, that of the nearest pixel inside that has one, 0 elsewhere."""
+    known = inside & np.isfinite(height)
+    filled = np.nan_to_num(height)
+    if known.any():
+        _, index = cv2.distanceTransformWithLabels(
+            (~known).view(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
+        )
+        nearest = np.zeros(index.max() + 1, np.float32)
+        nearest[index[known]] = height[known]
+        filled = np.where(inside & ~known, nearest[index], filled)
+    return filled

@@ -33,7 +33,7 @@ def superpixels(
 
     Args:
         color: [H, W, 3], RGB.
-        height: [H, W], m above the table, NaN where unknown.
+        height: [H, W], m above the table.
         mask: [H, W], what to cut.
         size: pixels between the seeds.
     """
@@ -69,7 +69,7 @@ def _edges_image(color: NDArray[np.uint8], height: NDArray[np.float32]) -> NDArr
     smooth = cv2.GaussianBlur(color, (0, 0), 1.0)
     gray = cv2.cvtColor(smooth, cv2.COLOR_RGB2GRAY)
     warm = (smooth[..., 0].astype(np.int16) - smooth[..., 2]) // 2 + 128
-    levels = np.clip(np.nan_to_num(height) * _HEIGHT_STEPS, 0, 255).astype(np.uint8)
+    levels = np.clip(height * _HEIGHT_STEPS, 0, 255).astype(np.uint8)
     return np.stack([gray, warm.astype(np.uint8), cv2.medianBlur(levels, 5)], axis=-1)
 
 

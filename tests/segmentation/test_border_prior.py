@@ -20,7 +20,8 @@ def two_halves(height: np.ndarray, color: np.ndarray, depth: np.ndarray | None =
         count=2,
         borders=cut.borders,
         superpixels=cut,
-        above=SimpleNamespace(height=height.astype(np.float32)),
+        height=height.astype(np.float32),
+        area=np.array([800, 800]),
         frame=SimpleNamespace(color=color, depth=np.ones((40, 40), np.float32) if depth is None else depth),
     )
 
@@ -64,21 +65,29 @@ def test_the_largest_difference_of_any_channel_counts():
     assert cues[3] == pytest.approx(30 * 0.8664, abs=0.6)
 
 
-def test_holes_are_a_share_of_the_border():
+def test_holes_are_a_share_of_the_border_beyond_that_of_its_sides():
     depth = np.ones((40, 40), np.float32)
     depth[:10, 19:21] = 0
     (cues,) = border_cues(two_halves(FLAT, GRAY, depth))
-    assert cues[4] == pytest.approx(0.25)
+    # 10 of the 800 pixels on each side.
+    assert cues[4] == pytest.approx(0.25 - 10 / 800)
+
+
+def test_what_has_holes_everywhere_has_no_border_where_one_is():
+    depth = np.ones((40, 40), np.float32)
+    depth[::4] = 0
+    (cues,) = border_cues(two_halves(FLAT, GRAY, depth))
+    assert cues[4] == pytest.approx(0)
 
 
 def test_every_cue_makes_one_body_less_likely_by_its_weight_and_the_picture_proves_nothing():
     color = np.where(U[..., None] < 20, 0, 255).astype(np.uint8).repeat(3, -1)
     parameters = BorderPriorParameters()
-    # Colour saturates at 60 gray levels, a quarter of the border is without depth.
+    # Colour saturates at 60 gray levels, a quarter of the border is without depth, and a fortieth of its sides.
     depth = np.ones((40, 40), np.float32)
-    depth[:10] = 0
+    depth[:10, 18:22] = 0
     both = border_prior(two_halves(FLAT, color, depth), parameters)
-    assert both == pytest.approx([2.5 - 0.045 * 60 - 1.6 * 0.25])
+    assert both == pytest.approx([2.5 - 0.045 * 60 - 1.6 * (0.25 - 0.025)])
     step = border_prior(two_halves(np.where(U < 20, 0.03, 0.024), color, depth), parameters)
     assert step == pytest.approx(both - 0.2 * 3)
     deep = two_halves(np.where(np.abs(U - 19.5) < 3, 0.0, 0.03), color, np.zeros((40, 40), np.float32))

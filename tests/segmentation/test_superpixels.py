@@ -99,11 +99,6 @@ def test_two_halves_share_one_border_of_the_images_height() -> None:
     assert pieces.length[0] == pytest.approx(20, abs=2)
 
 
-def test_unknown_height_is_no_obstacle() -> None:
-    height = np.full((HEIGHT, WIDTH), np.nan, np.float32)
-    assert (cut(flat(), np.ones((HEIGHT, WIDTH), bool), 8, height).label >= 0).all()
-
-
 @pytest.mark.parametrize("size", [3, 6, 15])
 @pytest.mark.parametrize("color", [flat(), textured()], ids=["blank", "textured"])
 def test_the_pieces_cover_the_mask_and_nothing_else(color: np.ndarray, size: int) -> None:
