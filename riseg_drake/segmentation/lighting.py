@@ -1,14 +1,12 @@
-"""Shadows come and go: gray values compared where the light may have changed (not in the paper).
+"""Light changes: gray values compared where a surface may have become brighter or darker (not in the paper).
 
-A shadow makes a surface darker by one factor and leaves its pattern. So each small piece of the image
-may have become darker or brighter as a whole, at a price: mostly the light is what it was.
+What turns is shaded anew, and shadows come and go: a surface becomes darker by one factor and keeps its
+pattern. So each small piece of the image may have become darker or brighter as a whole, by a factor near 1 as
+a rule.
 """
 
 import numpy as np
 from numpy.typing import NDArray
-
-_TINY = 1e-6
-"""Keeps a piece that was black from dividing by zero."""
 
 
 def gray_costs(
@@ -18,9 +16,9 @@ def gray_costs(
     piece: NDArray[np.intp],
     count: int,
     cost_max: float,
-    relit: float,
+    certainty: float,
 ) -> NDArray[np.float32]:
-    """Squared normalised residuals [N] of gray values, where needed those of a piece in another light.
+    """Squared normalised residuals [N] of gray values, those of each piece in the light that fits it best.
 
     Args:
         before: [N], gray values at t-1.
@@ -29,7 +27,8 @@ def gray_costs(
         piece: [N], 0..count-1, each changes its light as one.
         count: number of pieces.
         cost_max: squared residuals count no more than that.
-        relit: what it adds to each pixel of a piece if the light there is taken to have changed.
+        certainty: 1 / variance of the factor by which a piece's light changes, in the measure of the squared
+            residuals of all of its pixels; what that costs is shared out among them.
 
     Returns:
         [N]; NaN where there is nothing to compare.
@@ -37,18 +36,19 @@ def gray_costs(
     ceiling = np.float32(cost_max)
     cost = np.minimum((after - before) ** 2 * per_variance, ceiling)
     compared = np.isfinite(cost)
+    pixels = np.bincount(piece, compared, count)
     total = np.bincount(piece, np.where(compared, cost, 0), count)
-    doubtful = total > (1 + relit) * np.bincount(piece, compared, count)
-    mine = np.flatnonzero(doubtful[piece] & compared)
+    mine = np.flatnonzero((total > 0.5 * pixels)[piece] & compared)
     if not len(mine):
         return cost
     piece, before, after, weight = piece[mine], before[mine], after[mine], per_variance[mine]
-    # The factor that fits a piece best, by least squares.
-    squares = np.maximum(np.bincount(piece, weight * before**2, count), _TINY)
-    by = (np.bincount(piece, weight * before * after, count) / squares).astype(np.float32)[piece]
+    # The likeliest factor, by least squares.
+    products = np.bincount(piece, weight * before * after, count) + certainty
+    factor = (products / (np.bincount(piece, weight * before**2, count) + certainty)).astype(np.float32)
+    price = (certainty * (factor - 1) ** 2 / np.maximum(pixels, 1)).astype(np.float32)
+    by = factor[piece]
     # With it the noise of the first image is amplified.
-    other = (after - by * before) ** 2 * weight / np.maximum(by, 1) ** 2
-    other = np.minimum(other, ceiling) + np.float32(relit)
+    other = np.minimum((after - by * before) ** 2 * weight / np.maximum(by, 1) ** 2, ceiling) + price[piece]
     better = (np.bincount(piece, other, count) < total)[piece]
     cost[mine[better]] = other[better]
     return cost

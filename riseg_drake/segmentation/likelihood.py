@@ -30,10 +30,14 @@ class LikelihoodParameters:
 
     residual_max: float = 9.0
     """Squared normalised residuals of gray and of depth count no more than that each (highlights)."""
-    relit: float = 1.0
-    """What it adds to a pixel's squared residual if the light on its superpixel is taken to have changed."""
+    light: float = 0.05
+    """Standard deviation of the factor by which the light on a superpixel changes, as shading does when things
+    turn."""
     correlated_pixels: float = 6.0
-    """Noise of depth and gray is correlated over about so many pixels; they count as one."""
+    """Errors of gray are alike in about so many pixels (pose, interpolation); they count as one."""
+    correlated_depth: float = 28.0
+    """The same of depth, whose errors are those of matching windows: 4 pi sigma^2 for noise that is smoothed
+    over 1.5 pixels (docs/sensing.md)."""
     chance: float = 1.5
     """Times the mean squared residual that is usual, up to which a superpixel's may be by chance."""
     view_error: float = 0.01
@@ -88,6 +92,7 @@ def motion_costs(
     shift = np.float32(parameters.view_error * span)
     per_variance = 1 / (keyframe.variance + shift**2 * keyframe.gradient_squared)
     smooth = np.float32(parameters.view_error * min(1.0, span / _ANOTHER_VIEW))
+    of_depth = np.float32(parameters.correlated_pixels / parameters.correlated_depth)
     witnesses = np.bincount(keyframe.owner, minlength=keyframe.count).astype(float)
     misfit = np.full((len(motions_K), keyframe.count), EXPECTED)
     for mean, motion in zip(misfit, motions_K, strict=True):
@@ -100,11 +105,11 @@ def motion_costs(
             keyframe.owner,
             keyframe.count,
             parameters.residual_max,
-            parameters.relit,
+            parameters.correlated_pixels / parameters.light**2,
         )
         sigma = np.hypot(depth_sigma(sought.depth, float(np.sqrt(2)) * depth_noise), smooth * sought.depth)
         geometric = np.minimum(((z_1 - sought.depth) / sigma) ** 2, ceiling)
-        both = photometric + np.where(z_1 > 0, geometric, np.float32(1))
+        both = photometric + np.where(z_1 > 0, 1 + of_depth * (geometric - 1), np.float32(1))
         # What cannot be compared speaks neither for nor against: the value expected of a match.
         total = np.bincount(keyframe.owner, np.where(np.isnan(both), EXPECTED, both), keyframe.count)
         np.divide(total, witnesses, out=mean, where=witnesses > 0)

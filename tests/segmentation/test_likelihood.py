@@ -1,0 +1,70 @@
+"""What a motion costs a superpixel, worked out by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe
+from riseg_drake.segmentation.likelihood import Costs, LikelihoodParameters, motion_costs
+from riseg_drake.segmentation.noise import MeasurementNoise
+from tests.segmentation.drawn_scene import Blank, DrawnScene, looking_down, planar, standing
+
+pytestmark = pytest.mark.renders
+
+DEPTH_NOISE = 0.0023
+"""Standard deviation of depth at 1 m, m."""
+STILL = np.eye(4)[None]
+
+
+@pytest.fixture(scope="module")
+def plate() -> tuple[Keyframe, Frame]:
+    """A blank box from above, without any noise."""
+    frame, label = DrawnScene([(0.1, 0.1, 0.03)], textures=[Blank(120.0)]).frame(
+        0, looking_down(), [planar(0, 0)]
+    )
+    above = standing(frame, label > 0)
+    return make_keyframe(frame, above, MeasurementNoise(), KeyframeParameters()), frame
+
+
+def costs(keyframe: Keyframe, frame: Frame, **parameters: float) -> np.ndarray:
+    """Mean squared residuals of the superpixels that have witnesses."""
+    misfit = motion_costs(keyframe, frame, STILL, DEPTH_NOISE, LikelihoodParameters(**parameters)).misfit[0]
+    return misfit[np.bincount(keyframe.owner, minlength=keyframe.count) > 0]
+
+
+def test_depth_counts_by_how_many_pixels_its_noise_is_alike_in(plate: tuple[Keyframe, Frame]) -> None:
+    keyframe, frame = plate
+    # Two standard deviations of the difference of two depths: squared residuals of 4.
+    nearer = replace(frame, depth=frame.depth - np.float32(2 * np.sqrt(2) * DEPTH_NOISE) * frame.depth**2)
+    for correlated, expected in ((6.0, 4.0), (12.0, 1 + 3 / 2), (28.0, 1 + 3 * 6 / 28)):
+        # The spread is that at the depth which is expected; gray has no residual.
+        np.testing.assert_allclose(costs(keyframe, nearer, correlated_depth=correlated), expected, rtol=1e-3)
+
+
+def test_where_no_depth_is_it_costs_what_a_match_does(plate: tuple[Keyframe, Frame]) -> None:
+    keyframe, frame = plate
+    np.testing.assert_allclose(costs(keyframe, replace(frame, depth=np.zeros_like(frame.depth))), 1, atol=1e-3)
+
+
+def test_light_has_one_price_a_superpixel(plate: tuple[Keyframe, Frame]) -> None:
+    keyframe, frame = plate
+    brighter = replace(frame, color=np.full_like(frame.color, 132))
+    witnesses = np.bincount(keyframe.owner, minlength=keyframe.count)
+    witnesses = witnesses[witnesses > 0]
+    # 120 to 132: minimise n (132 - 120 f)^2 / 8 + c (f - 1)^2 over f, with c = 6 / 0.05^2.
+    c = 6 / 0.05**2
+    f = (witnesses * 120 * 132 / 8 + c) / (witnesses * 120**2 / 8 + c)
+    # Depth's residual is 0 and its share of a pixel's cost 6 / 28.
+    expected = (132 - 120 * f) ** 2 / 8 / f**2 + c * (f - 1) ** 2 / witnesses + 1 - 6 / 28
+    np.testing.assert_allclose(costs(keyframe, brighter), expected, rtol=0.02)
+
+
+def test_nats_are_squared_residuals_by_what_is_usual_and_no_more_than_a_superpixel_may_say() -> None:
+    # 24 pixels count as 4, half of each squared residual; what is usual is 2, up to 3 may be by chance.
+    misfit, witnesses = np.array([[2.0, 2.0, 3.5], [2.5, 4.0, 2.0]]), np.array([24.0, 24.0, 24.0])
+    nats = Costs(misfit, witnesses).nats(LikelihoodParameters())
+    np.testing.assert_allclose(nats, [[0, 0, 0.5 * 2], [0, 1.0 * 2, 0]])
+    twice = Costs(misfit, 100 * witnesses).nats(LikelihoodParameters())
+    np.testing.assert_allclose(twice, [[0, 0, 4], [0, 4, 0]])
