@@ -2,8 +2,9 @@
 
 A body frame knows its motion from flow inside a few centimetres. A blank body has flow at its edges
 only, each of which tells one direction. Here every pixel with a gradient takes part, wherever on the
-body it lies: the motion that makes the second image agree with the first, in gray value and in depth,
-is found by Gauss-Newton from where the group's motion starts. Nothing of it is in the paper.
+body it lies, and others on a grid, by which depth tells how its surface lies: the motion that makes the second
+image agree with the first is found by Gauss-Newton from where the group's motion starts. Nothing of it is in
+the paper.
 """
 
 from dataclasses import dataclass
@@ -21,7 +22,9 @@ from riseg_drake.segmentation.surface import Sought, SurfacePixels, seek, surfac
 _GRADIENT_MIN = 1.0
 """Squared gray gradient of a pixel that tells where it is, in variances of the sensor's noise."""
 _CORRELATED = 6.0
-"""Noise of depth is correlated over about so many pixels; they count as one."""
+"""Noise of depth is correlated over about so many pixels along an edge; they count as one."""
+_GRID = 4
+"""Pixels between those without a gradient, whose noise of depth is hardly correlated."""
 _COST_MAX = np.float32(9)
 """Squared normalised residuals count no more than that."""
 
@@ -46,7 +49,7 @@ class AlignmentParameters:
 
 @dataclass(frozen=True)
 class EdgePixels(Immutable):
-    """The pixels of the reference frame whose gray values tell where they are at t."""
+    """The pixels of the reference frame whose gray values tell where they are at t, and a grid of others."""
 
     surface: SurfacePixels
     p_C0Q: NDArray[np.float64]
@@ -57,6 +60,8 @@ class EdgePixels(Immutable):
     """[N]."""
     variance: NDArray[np.float32]
     """[N], of the difference between that and where it should reappear."""
+    alike: NDArray[np.float32]
+    """[N], how many of them have much the same noise of depth."""
 
     def subset(self, which: NDArray[np.intp]) -> "EdgePixels":
         """Some of the pixels, by their numbers [N]."""
@@ -66,6 +71,7 @@ class EdgePixels(Immutable):
             self.piece[which],
             self.gray[which],
             self.variance[which],
+            self.alike[which],
         )
 
 
@@ -111,7 +117,7 @@ def edge_pixels(
     variance: NDArray[np.float32],
     pixels_max: int,
 ) -> EdgePixels:
-    """Evenly taken pixels with contrast of the pieces [H, W] (-1 = none).
+    """Evenly taken pixels with contrast of the pieces [H, W] (-1 = none), and some of the others.
 
     Args:
         frame: of t-1.
@@ -120,11 +126,14 @@ def edge_pixels(
         variance: [H, W], see `gray_variance`.
         pixels_max: at most so many are taken.
     """
-    surface = surface_pixels((piece >= 0) & contrast, frame.depth, frame.intrinsics)
+    asked = contrast.copy()
+    asked[::_GRID, ::_GRID] = True
+    surface = surface_pixels((piece >= 0) & asked, frame.depth, frame.intrinsics)
     surface = surface.subset(np.arange(0, len(surface), max(1, -(-len(surface) // pixels_max))))
     v, u = surface.pixel
     p_C0Q = rays(frame.intrinsics)[v, u].astype(float) * surface.depth[:, None]
-    return EdgePixels(surface, p_C0Q, piece[v, u], frame.gray[v, u], variance[v, u])
+    alike = np.where(contrast[v, u], np.float32(_CORRELATED), np.float32(1))
+    return EdgePixels(surface, p_C0Q, piece[v, u], frame.gray[v, u], variance[v, u], alike)
 
 
 def has_contrast(variance: NDArray[np.float32], noise: MeasurementNoise) -> NDArray[np.bool_]:
@@ -182,7 +191,7 @@ class RigidFit:
 
     def _linearised(
         self, edges: EdgePixels, X: NDArray, centre: NDArray
-    ) -> list[tuple[NDArray, NDArray, float]]:
+    ) -> list[tuple[NDArray, NDArray, NDArray | np.float32]]:
         """Residuals of gray value and depth [N], their derivatives by a twist about the centre [N, 6], and
         how many pixels of each say the same."""
         gray, depth, sigma, sought = self._residuals(edges, X)
@@ -203,7 +212,7 @@ class RigidFit:
         d_depth = -R_C1C0[2] / sigma[:, None]
         return [
             (residual, np.column_stack([np.cross(p - centre, d_p), d_p]), count)
-            for residual, d_p, count in ((gray, d_gray, 1.0), (depth, d_depth, _CORRELATED))
+            for residual, d_p, count in ((gray, d_gray, np.float32(1)), (depth, d_depth, edges.alike))
         ]
 
     def _residuals(self, edges: EdgePixels, motion: NDArray) -> tuple[NDArray, NDArray, NDArray, Sought]:

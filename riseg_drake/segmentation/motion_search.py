@@ -2,8 +2,8 @@
 
 Things that are pushed over a table slide and turn on it: three numbers, and a push is short. So all of them
 are tried on a grid, for a small patch of what is not explained, which mostly lies on one body; the best few
-are sharpened, on ever more of what they explain. Texture, outline and height all tell, so blank things are
-found, too.
+are sharpened, on ever more of what they explain. A patch of a blank thing tells little: so the same is done
+with all of what may be one body, whose outline and height tell.
 """
 
 from collections.abc import Sequence
@@ -45,8 +45,10 @@ class MotionSearchParameters:
     """Pixels; both images are blurred so much that a step of the grid leads into the right valley."""
     best: int = 4
     """Valleys that are gone down."""
-    unexplained: float = 4.0
+    unexplained: float = 3.0
     """Mean squared residuals from which a superpixel is not explained."""
+    weaker: list[float] = field(default_factory=lambda: [0.0, 0.5, 1.0, 1.5])
+    """Log-odds by which all bonds are weakened in turn, to see what may be a body."""
     same_flow: float = 1.0
     """Pixels (root mean square) within which two motions are one, and what moves stands still."""
     rounds: int = 24
@@ -70,7 +72,7 @@ def search_motions(
     keyframe: Keyframe,
     frame: Frame,
     above: AboveTable,
-    part: NDArray[np.intp],
+    divisions: NDArray[np.intp],
     proposed_K: NDArray[np.float64],
     depth_noise: float,
     gain_min: float,
@@ -84,7 +86,7 @@ def search_motions(
         keyframe: at the rest before.
         frame: at the rest after.
         above: objMask of that frame.
-        part: [N], 0.., which superpixels are one body so far.
+        divisions: [L, N], 0.., ways to tell which superpixels are one body.
         proposed_K: [G, 4, 4], what was seen in motion; taken where it explains what nothing found does.
         depth_noise: standard deviation of depth at 1 m, m.
         gain_min: nats that a motion must bring.
@@ -96,32 +98,37 @@ def search_motions(
     costs = motion_costs(keyframe, frame, np.eye(4)[None], depth_noise, likelihood)
     asked = costs.witnesses > likelihood.correlated_pixels
     tried = np.zeros(keyframe.count, bool)
-    part_tried = np.zeros(int(part.max(initial=-1)) + 1, bool)
     pixels_min = area_min * keyframe.pixels_per_metre**2
     found: list[NDArray] = []
+
+    def take(patch: NDArray[np.bool_], motion: tuple[float, NDArray, Costs] | None) -> bool:
+        nonlocal costs
+        if motion is None or motion[0] < gain_min or not search.differs(motion[1], found, patch):
+            return False
+        found.append(motion[1])
+        costs = costs.with_motion(motion[2])
+        return True
+
     for _ in range(parameters.rounds):
         unexplained = (costs.misfit.min(0) > parameters.unexplained) & asked
         patch, distance = search.densest_patch(unexplained & ~tried)
         if keyframe.area[patch].sum() < 0.2 * pixels_min:
-            # Each superpixel of a blank surface may be explained, by one motion or another, all of it by none.
-            short = unexplained_parts(costs.nats(likelihood), part) * ~part_tried
-            if not len(short) or short.max() < gain_min:
-                break
-            patch = part == short.argmax()
-            part_tried[short.argmax()] = True
-            distance = np.where(patch, 0.0, np.inf)
+            break
         tried |= patch & unexplained
-        best = search.best_motion(patch, distance, costs, part)
-        if best is not None and best[0] >= gain_min and search.differs(best[1], found, patch):
-            found.append(best[1])
-            costs = costs.with_motion(best[2])
+        if take(patch, search.best_motion(patch, distance, costs, divisions)):
             # What it did not explain may be tried with other neighbours.
             tried &= costs.misfit.min(0) > parameters.unexplained
+    # Each superpixel of a blank body may be explained, by one motion or another, all of it by none.
+    bodies = _possible_bodies(divisions, keyframe.area, pixels_min)
+    while len(bodies):
+        short = (bodies @ costs.nats(likelihood).T).min(1)
+        worst = int(short.argmax())
+        if short[worst] < gain_min:
+            break
+        body, bodies = bodies[worst], np.delete(bodies, worst, axis=0)
+        take(body, search.best_motion(body, np.where(body, 0.0, np.inf), costs, divisions))
     for motion in proposed_K:
-        gain, motion, own = search.sharpened(motion, costs, part)
-        if gain >= gain_min and search.differs(motion, found, np.zeros(keyframe.count, bool)):
-            found.append(motion)
-            costs = costs.with_motion(own)
+        take(np.zeros(keyframe.count, bool), search.sharpened(motion, costs, divisions))
     return np.array(found).reshape(-1, 4, 4)
 
 
@@ -134,6 +141,13 @@ def unexplained_parts(nats: NDArray[np.float64], part: NDArray[np.intp]) -> NDAr
     """
     count = int(part.max(initial=-1)) + 1
     return np.min([np.bincount(part, n, count) for n in nats], axis=0)
+
+
+def _possible_bodies(divisions: NDArray[np.intp], area: NDArray[np.intp], area_min: float) -> NDArray[np.bool_]:
+    """[B, N], the parts of all divisions [L, N] that are as large as a body, each once."""
+    parts = [part == p for part in divisions for p in range(int(part.max(initial=-1)) + 1)]
+    large = [part for part in parts if area[part].sum() >= area_min]
+    return np.unique(np.array(large).reshape(-1, len(area)), axis=0)
 
 
 class _Search:
@@ -177,7 +191,7 @@ class _Search:
         return among & (distance < self._parameters.patch), distance
 
     def best_motion(
-        self, patch: NDArray[np.bool_], distance: NDArray[np.float64], costs: Costs, part: NDArray[np.intp]
+        self, patch: NDArray[np.bool_], distance: NDArray[np.float64], costs: Costs, divisions: NDArray[np.intp]
     ) -> tuple[float, NDArray, Costs] | None:
         """What a patch [N] did: the gain, nats, the motion [4, 4], and its costs."""
         best_known = costs.misfit.min(0)
@@ -196,7 +210,7 @@ class _Search:
                     break
                 motion = fitted
             own = self._costs(motion)
-            results.append((self._gain(own, costs, part), motion, own))
+            results.append((self._gain(own, costs, divisions), motion, own))
         # Gains end where noise begins; among those that are alike the patch itself tells.
         weight = costs.witnesses * patch / (2 * self._likelihood.correlated_pixels)
         return max(results, key=lambda r: r[0] - float(weight @ r[2].misfit[0]), default=None)
@@ -211,14 +225,16 @@ class _Search:
             for X in (np.eye(4), *others)
         )
 
-    def sharpened(self, motion: NDArray, costs: Costs, part: NDArray[np.intp]) -> tuple[float, NDArray, Costs]:
+    def sharpened(
+        self, motion: NDArray, costs: Costs, divisions: NDArray[np.intp]
+    ) -> tuple[float, NDArray, Costs]:
         """A proposed motion [4, 4], made to fit what it explains: the gain, nats, the motion, and its costs."""
         mine = self._costs(motion).misfit[0]
         better = (mine < self._parameters.unexplained + 1) & (mine < costs.misfit.min(0) - _BETTER)
         fitted = self._fitted(motion, better)
         motion = motion if fitted is None else fitted
         own = self._costs(motion)
-        return self._gain(own, costs, part), motion, own
+        return self._gain(own, costs, divisions), motion, own
 
     def _fitted(self, motion: NDArray, members: NDArray[np.bool_]) -> NDArray | None:
         """A motion [4, 4] sharpened on the edges of some superpixels [N]; None where they have too few."""
@@ -228,14 +244,15 @@ class _Search:
         alignment = self._parameters.alignment
         return self._fit.align(self._keyframe.edges.subset(edges), motion, alignment.rounds, alignment)[0]
 
-    def _gain(self, own: Costs, costs: Costs, part: NDArray[np.intp]) -> float:
+    def _gain(self, own: Costs, costs: Costs, divisions: NDArray[np.intp]) -> float:
         """Nats by which a motion explains a part better, or superpixels wherever they are."""
         nats = costs.with_motion(own).nats(self._likelihood)
         better = np.clip(nats[:-1].min(0) - nats[-1], 0, None)
-        of_parts = unexplained_parts(nats[:-1], part) - unexplained_parts(nats, part)
-        return float(
-            max(better[own.misfit[0] < self._parameters.unexplained + 1].sum(), of_parts.max(initial=0))
-        )
+        of_parts = [
+            (unexplained_parts(nats[:-1], part) - unexplained_parts(nats, part)).max(initial=0)
+            for part in divisions
+        ]
+        return float(max(better[own.misfit[0] < self._parameters.unexplained + 1].sum(), *of_parts))
 
     def _costs(self, motion: NDArray) -> Costs:
         return motion_costs(self._keyframe, self._frame, motion[None], self._depth_noise, self._likelihood)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
 from riseg_drake.segmentation.alignment import AlignmentParameters, align_motions
+from riseg_drake.segmentation.frame_pairs import camera_span
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.likelihood import LikelihoodParameters, motion_costs
 from riseg_drake.segmentation.motions import flow_difference
@@ -33,6 +34,8 @@ class ObservationParameters:
     motion_cost: float = 30.0
     """Nats that a motion must explain better than all others do, to be one: eight superpixels' worth:
     errors of the view are common to neighbours."""
+    view_errors: float = 3.0
+    """Errors of the view (`view_error`) that what moves must move by."""
     along: float = 0.2
     """rho(k | k) of a motion: probability with which a thing pushes its neighbour along as if they were one."""
     stays: float = 0.8
@@ -90,6 +93,8 @@ def observe(
     motions_K = np.concatenate([np.eye(4)[None], candidates_K])
     costs = motion_costs(keyframe, frame, motions_K, depth_noise, parameters.likelihood)
     nats = costs.nats(parameters.likelihood)
+    moves = _more_than_the_view_errs(keyframe, frame, motions_K, nats, parameters)
+    motions_K, nats = motions_K[moves], nats[moves]
     needed, motion = _fewest_motions(nats, keyframe, bond, part, parameters)
     nats = nats[needed]
     share = np.bincount(motion, keyframe.area, len(needed)) / max(1, keyframe.area.sum())
@@ -106,6 +111,24 @@ def observe(
         evidence=bond_evidence(q, share, keyframe.borders, parameters.stays, parameters.along),
         span=np.array(spans)[motion],
     )
+
+
+def _more_than_the_view_errs(
+    keyframe: Keyframe,
+    frame: Frame,
+    motions_K: NDArray[np.float64],
+    nats: NDArray[np.float64],
+    parameters: ObservationParameters,
+) -> NDArray[np.bool_]:
+    """Which motions [G] move what they explain better than standing still does, the first, by more pixels than
+    it may seem to move from another view; standing still is among them."""
+    least = parameters.view_errors * parameters.likelihood.view_error * camera_span(keyframe.frame, frame)
+    edges, focal_length = keyframe.edges, frame.intrinsics.fx
+    moves = np.ones(len(motions_K), bool)
+    for k in range(1, len(motions_K)):
+        p_KQ = edges.p_C0Q[(nats[k] < nats[0])[edges.piece]]
+        moves[k] = len(p_KQ) > 0 and flow_difference(p_KQ, motions_K[k], np.eye(4), focal_length) > least
+    return moves
 
 
 def motion_posterior(

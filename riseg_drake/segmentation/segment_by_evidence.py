@@ -34,7 +34,7 @@ from riseg_drake.segmentation.memory import Memory, draw_memory, moved_memory, r
 from riseg_drake.segmentation.motion_search import MotionSearchParameters, search_motions
 from riseg_drake.segmentation.motions import BFIFGroups
 from riseg_drake.segmentation.observation import Observation, ObservationParameters, observe
-from riseg_drake.segmentation.partition import margins
+from riseg_drake.segmentation.partition import margins, partition
 from riseg_drake.segmentation.propagation import UNKNOWN, pixels_of
 from riseg_drake.segmentation.rest import RestParameters, is_still
 from riseg_drake.segmentation.segmentation import Segmentation
@@ -177,11 +177,15 @@ def _searched(
     depth_noise: float,
     parameters: EvidenceParameters,
 ) -> NDArray[np.float64]:
+    divisions = [
+        partition(belief.keyframe, belief.bond - by, parameters.belief.partition)
+        for by in parameters.search.weaker
+    ]
     return search_motions(
         belief.keyframe,
         frame,
         above,
-        belief.part,
+        np.array(divisions),
         candidates_K,
         depth_noise,
         parameters.observation.motion_cost,

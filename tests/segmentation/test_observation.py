@@ -1,7 +1,17 @@
+"""Which motions there are, and what they say of neighbours, by hand."""
+
 import numpy as np
 import pytest
 
-from riseg_drake.segmentation.observation import bond_evidence, motion_posterior
+from riseg_drake.segmentation.belief import BeliefParameters, first_belief
+from riseg_drake.segmentation.noise import MeasurementNoise
+from riseg_drake.segmentation.observation import (
+    ObservationParameters,
+    bond_evidence,
+    motion_posterior,
+    observe,
+)
+from tests.segmentation.drawn_scene import DrawnScene, looking_down, motion_seen_from, planar, standing
 
 SHARE = np.array([0.8, 0.2])
 
@@ -51,3 +61,25 @@ def test_costs_and_commonness_weigh_as_bayes_has_it():
     # Two nats for the rare motion: odds 0.2 e^2 to 0.8.
     q = motion_posterior(np.array([[2.0], [0.0]]), SHARE, outlier=0.0)
     assert q[1, 0] == pytest.approx(0.2 * np.e**2 / (0.2 * np.e**2 + 0.8))
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize(
+    ("aside", "is_one"), [(0.0, True), (0.12, False)], ids=["camera stands", "camera moves"]
+)
+def test_a_pixel_and_a_half_are_a_motion_unless_the_view_is_another_one(aside: float, is_one: bool) -> None:
+    # 12 cm aside are 82 pixels; a per cent of that is how much things may seem to move.
+    scene, places = (
+        DrawnScene([(0.08, 0.07, 0.03), (0.06, 0.08, 0.05)]),
+        [planar(-0.07, 0.0), planar(0.06, 0.0)],
+    )
+    there = [planar(-0.0678, 0.0), places[1]]
+    cameras = (looking_down(), looking_down(aside))
+    pair, label, _ = scene.pair(cameras, (places, there), np.random.default_rng(0))
+    above = standing(pair.reference, label > 0)
+    belief = first_belief(pair.reference, above, MeasurementNoise(), BeliefParameters())
+    moved = motion_seen_from(cameras[0], places[0], there[0])
+    seen = observe(
+        belief.keyframe, pair.current, belief.bond, belief.part, moved, 0.0023, ObservationParameters()
+    )
+    assert (len(seen.motions_K) == 2) is is_one
