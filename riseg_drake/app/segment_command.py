@@ -139,6 +139,7 @@ def _segment(
             f"{reader.folder}: no frame shows a table top; the first: {result.left_out[-1].why}"
         )
     folder.write_untouched(untouched_clusters(replay.segmentation))
+    folder.finish()
 
 
 def _take(

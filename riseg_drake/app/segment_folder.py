@@ -9,9 +9,12 @@
 Whenever it is stopped, the masks that are there are whole, and the summary says how many they are.
 """
 
+import errno
+import os
 import re
 import struct
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +22,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.app.output_folder import OutputFolder
+from riseg_drake.app.output_folder import OutputError, OutputFolder
 from riseg_drake.evaluation.scores import Scores
 from riseg_drake.host.processes import undisturbed
 from riseg_drake.pictures.masks import draw_masks
@@ -84,14 +87,26 @@ class SegmentFolder:
         """Enter something in the summary."""
         self._folder.note(**entries)
 
-    def close(self) -> None:
-        """Finish the video and the table of scores, and let others write there."""
+    def finish(self) -> None:
+        """Finish the video and the table of scores, once all frames are written.
+
+        Raises OutputError where the video could not be written whole.
+        """
         with undisturbed(), self._folder.writing():
-            self._finish_video()
             if self._scores is not None:
                 self._scores.close()
                 self._scores = None
-        self._folder.close()
+            if not self._finish_video():
+                why = f"it could not be written whole: {os.strerror(errno.ENOSPC)}?"
+                raise OSError(errno.ENOSPC, why, str(self.path / VIDEO))
+
+    def close(self) -> None:
+        """Finish what can be, and let others write there."""
+        try:
+            with suppress(OutputError):  # what ended it has been said
+                self.finish()
+        finally:
+            self._folder.close()
 
     def __enter__(self) -> "SegmentFolder":
         return self
@@ -99,17 +114,18 @@ class SegmentFolder:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _finish_video(self) -> None:
-        """Close the video; where all of it could not be written, there is none."""
+    def _finish_video(self) -> bool:
+        """Close the video; where not all of it could be written, there is none, and the answer is no."""
         if self._video is None:
-            return
+            return True
         self._video.release()
         self._video = None
         unfinished = self.path / _UNFINISHED_VIDEO
-        if _is_whole_video(unfinished):
-            unfinished.replace(self.path / VIDEO)
-        else:
+        if not _is_whole_video(unfinished):
             unfinished.unlink(missing_ok=True)
+            return False
+        unfinished.replace(self.path / VIDEO)
+        return True
 
     def _file_name(self, color_name: str) -> str:
         """The colour image's name; with a number behind it where an image is listed more than once."""

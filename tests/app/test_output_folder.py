@@ -4,6 +4,8 @@ import errno
 import json
 import shutil
 
+import cv2
+import numpy as np
 import pytest
 
 from riseg_drake.app import output
@@ -183,3 +185,25 @@ def test_a_place_where_nothing_can_be_written_is_named(tmp_path, capsys):
     recording = write(tmp_path / "recording", drawn_frames(1))
     assert main(["segment", str(recording), "--output", "/proc/nowhere/out"]) == 2
     assert capsys.readouterr().err.startswith("riseg: cannot write to /proc/nowhere: ")
+
+
+def test_a_video_that_is_not_whole_ends_a_segmentation_instead_of_being_left_out(tmp_path, monkeypatch):
+    with SegmentFolder(tmp_path / "out", 10.0, {}) as folder:
+        folder.write("1.png", np.zeros((20, 30, 3), np.uint8), np.zeros((20, 30), np.uint16), {}, None)
+        # What OpenCV leaves of it, without a word, where there is no room for more.
+        video = tmp_path / "out" / ".overlay.unfinished.mp4"
+        release = cv2.VideoWriter.release
+
+        class Cut:
+            def __init__(self, writer):
+                self.writer = writer
+
+            def release(self):
+                release(self.writer)
+                video.write_bytes(video.read_bytes()[:40])
+
+        monkeypatch.setattr(folder, "_video", Cut(folder._video))
+        with pytest.raises(OutputError, match=r"overlay\.mp4: it could not be written whole: No space left"):
+            folder.finish()
+    assert not list((tmp_path / "out").glob("*.mp4"))
+    assert not video.exists()
