@@ -3,16 +3,19 @@
 python -m tests.faults stops --commands run segment evaluate hardware --signals INT KILL --count 30
 python -m tests.faults inputs --count 20000
 python -m tests.faults machine
+python -m tests.faults long --minutes 20
 
 With --log FILE what was found is kept, and the next part is added to it.
 """
 
 import argparse
+import tempfile
 from pathlib import Path
 
 from tests.faults.tally import Tally
 
 COMMANDS = ["run", "segment", "evaluate", "hardware"]
+KINDS = ["idle", "busy"]
 
 
 def main() -> int:
@@ -27,6 +30,10 @@ def main() -> int:
     inputs = parts.add_parser("inputs", help="mutated files and messages for every reader")
     inputs.add_argument("--readers", nargs="+", help="(all)")
     inputs.add_argument("--count", type=int, default=200, help="over all readers (200)")
+    long = parts.add_parser("long", help="arm and camera for a long time: memory, and gaps between commands")
+    long.add_argument("--minutes", type=float, default=20.0, help="of each kind (20)")
+    long.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
+    long.add_argument("--place", type=Path, help="folder to work in (a new one)")
     machine = parts.add_parser("machine", help="full and read-only disks, no shared memory, clocks set")
     for part in (stops, machine):
         part.add_argument("--commands", nargs="+", choices=COMMANDS, default=COMMANDS)
@@ -38,6 +45,11 @@ def main() -> int:
         from tests.faults.stops import try_stops
 
         try_stops(chosen.commands, chosen.signals, chosen.count, chosen.seed, tally, chosen.place)
+    elif chosen.part == "long":
+        from tests.faults.endurance import try_endurance
+
+        place = chosen.place or Path(tempfile.mkdtemp(prefix="riseg_faults_"))
+        try_endurance(chosen.minutes, chosen.kinds, tally, place)
     elif chosen.part == "inputs":
         from tests.faults.inputs import try_inputs
 

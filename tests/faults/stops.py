@@ -99,9 +99,9 @@ def run(
     command: Stoppable, output: Path, moment: float | None = None, number: int = 0, length: float = 0.0
 ) -> Ended:
     """Run a command to its end, or send it a signal at a moment, s; undisturbed it takes `length`, s."""
-    beside = [_started(words) for words in command.beside]
-    process = _start(f"{command.words} --output {output}")
-    start, was_stopped = time.monotonic(), False
+    beside = [started(words) for words in command.beside]
+    process = start(f"{command.words} --output {output}")
+    begun, was_stopped = time.monotonic(), False
     try:
         if moment is not None:
             try:
@@ -111,14 +111,14 @@ def run(
                 was_stopped = True
         is_told = was_stopped and number != signal.SIGSTOP
         code, errors = _awaited(process, max(PATIENCE, (2 if is_told else LONGEST) * length))
-        seconds = time.monotonic() - start
+        seconds = time.monotonic() - begun
         others = []
         for each in beside:
             _send(each, number if is_told else signal.SIGINT)
             others.append(Ended(*_awaited(each, PATIENCE), seconds, True))
     finally:
         for each in (process, *beside):
-            _end(each)
+            end(each)
     return Ended(code, errors, seconds, was_stopped, tuple(others))
 
 
@@ -154,7 +154,7 @@ def _awaited(process: subprocess.Popen, limit: float) -> tuple[int, str]:
 def _used(session: int) -> float:
     """What the living processes of a session, and those that they have seen end, have used so far, s."""
     used = 0
-    for pid, _ in _processes(session):
+    for pid, _ in processes(session):
         with suppress(OSError):
             fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
             used += sum(map(int, fields[11:15]))
@@ -164,7 +164,7 @@ def _used(session: int) -> float:
 def _stacks(process: subprocess.Popen) -> str:
     """Where all threads of a command that hangs are, as Python's faulthandler says it; it ends of that."""
     said = []
-    for pid, words in _processes(process.pid):
+    for pid, words in processes(process.pid):
         said.append(f"{pid}: {words}")
         with suppress(ProcessLookupError):
             os.kill(pid, signal.SIGABRT)
@@ -173,20 +173,23 @@ def _stacks(process: subprocess.Popen) -> str:
     return "\n".join(said)
 
 
-def _started(words: str) -> subprocess.Popen:
+def started(words: str) -> subprocess.Popen:
     """A command that waits for Ctrl-C, once it says so."""
     with tempfile.NamedTemporaryFile() as said:
-        process = _start(words, said)
+        process = start(words, said)
         while b"Ctrl-C" not in Path(said.name).read_bytes():
             assert process.poll() is None, process.communicate()[1]
             time.sleep(0.05)
     return process
 
 
-def _start(words: str, output: IO[bytes] | int = subprocess.DEVNULL) -> subprocess.Popen:
+def start(
+    words: str, output: IO[bytes] | int = subprocess.DEVNULL, told: int = subprocess.DEVNULL
+) -> subprocess.Popen:
+    """A command in a session of its own; what it is `told` is its standard input."""
     return subprocess.Popen(
         [sys.executable, "-m", "riseg_drake", *words.split()],
-        stdin=subprocess.DEVNULL,
+        stdin=told,
         stdout=output,
         stderr=subprocess.PIPE,
         text=True,
@@ -202,7 +205,7 @@ def _hear_signals() -> None:
         signal.signal(number, signal.SIG_DFL)
 
 
-def _end(process: subprocess.Popen) -> None:
+def end(process: subprocess.Popen) -> None:
     """End a command with all its processes."""
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
@@ -213,13 +216,13 @@ def _left(session: int) -> list[str]:
     """Processes of a session that are still there after a while, by their command lines."""
     deadline = time.monotonic() + LEFT_PATIENCE
     while True:
-        left = [words for pid, words in _processes(session) if pid != session]
+        left = [words for pid, words in processes(session) if pid != session]
         if not left or time.monotonic() > deadline:
             return left
         time.sleep(0.1)
 
 
-def _processes(session: int) -> list[tuple[int, str]]:
+def processes(session: int) -> list[tuple[int, str]]:
     """Living processes of a session."""
     found = []
     for folder in Path("/proc").glob("[0-9]*"):
