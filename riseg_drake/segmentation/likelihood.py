@@ -18,7 +18,7 @@ from riseg_drake.segmentation.lighting import gray_costs
 from riseg_drake.segmentation.noise import depth_sigma
 from riseg_drake.segmentation.surface import seek
 
-_ANOTHER_VIEW = 100.0
+ANOTHER_VIEW = 100.0
 """Pixels of the camera's motion from which smooth errors of depth are others."""
 EXPECTED = 2.0
 """Squared residuals of gray and depth, both, where a motion is right."""
@@ -91,7 +91,7 @@ def motion_costs(
     span = camera_span(keyframe.frame, frame)
     shift = np.float32(parameters.view_error * span)
     per_variance = 1 / (keyframe.variance + shift**2 * keyframe.gradient_squared)
-    smooth = np.float32(parameters.view_error * min(1.0, span / _ANOTHER_VIEW))
+    smooth = np.float32(parameters.view_error * min(1.0, span / ANOTHER_VIEW))
     of_depth = np.float32(parameters.correlated_pixels / parameters.correlated_depth)
     witnesses = np.bincount(keyframe.owner, minlength=keyframe.count).astype(float)
     misfit = np.full((len(motions_K), keyframe.count), EXPECTED)

@@ -18,7 +18,7 @@ from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
 from riseg_drake.segmentation.alignment import AlignmentParameters, align_motions
 from riseg_drake.segmentation.frame_pairs import camera_span
 from riseg_drake.segmentation.keyframe import Keyframe
-from riseg_drake.segmentation.likelihood import LikelihoodParameters, motion_costs
+from riseg_drake.segmentation.likelihood import ANOTHER_VIEW, LikelihoodParameters, motion_costs
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.potts import PottsGraph, potts_labels
 
@@ -122,7 +122,8 @@ def _more_than_the_view_errs(
 ) -> NDArray[np.bool_]:
     """Which motions [G] move what they explain better than standing still does, the first, by more pixels than
     it may seem to move from another view; standing still is among them."""
-    least = parameters.view_errors * parameters.likelihood.view_error * camera_span(keyframe.frame, frame)
+    span = min(camera_span(keyframe.frame, frame), ANOTHER_VIEW)
+    least = parameters.view_errors * parameters.likelihood.view_error * span
     edges, focal_length = keyframe.edges, frame.intrinsics.fx
     moves = np.ones(len(motions_K), bool)
     for k in range(1, len(motions_K)):
