@@ -96,9 +96,11 @@ class SegmentFolder:
             if self._scores is not None:
                 self._scores.close()
                 self._scores = None
-            if not self._finish_video():
-                why = f"it could not be written whole: {os.strerror(errno.ENOSPC)}?"
-                raise OSError(errno.ENOSPC, why, str(self.path / VIDEO))
+            whole = self._finish_video()
+        if not whole:
+            raise OutputError(
+                f"cannot write to {self.path / VIDEO}: it could not be written whole: {os.strerror(errno.ENOSPC)}?"
+            )
 
     def close(self) -> None:
         """Finish what can be, and let others write there."""

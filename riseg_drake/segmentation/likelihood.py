@@ -33,6 +33,8 @@ class LikelihoodParameters:
     light: float = 0.05
     """Standard deviation of the factor by which the light on a superpixel changes, as shading does when things
     turn."""
+    light_still: float = 0.02
+    """The same where nothing moves: shading stays what it was."""
     correlated_pixels: float = 6.0
     """Errors of gray are alike in about so many pixels (pose, interpolation); they count as one."""
     correlated_depth: float = 28.0
@@ -96,6 +98,7 @@ def motion_costs(
     witnesses = np.bincount(keyframe.owner, minlength=keyframe.count).astype(float)
     misfit = np.full((len(motions_K), keyframe.count), EXPECTED)
     for mean, motion in zip(misfit, motions_K, strict=True):
+        light = parameters.light_still if np.array_equal(motion, np.eye(4)) else parameters.light
         sought = seek(keyframe.witnesses, X_C1K @ motion)
         z_1 = sought.read(depth_1)
         photometric = gray_costs(
@@ -105,7 +108,7 @@ def motion_costs(
             keyframe.owner,
             keyframe.count,
             parameters.residual_max,
-            parameters.correlated_pixels / parameters.light**2,
+            parameters.correlated_pixels / light**2,
         )
         sigma = np.hypot(depth_sigma(sought.depth, float(np.sqrt(2)) * depth_noise), smooth * sought.depth)
         geometric = np.minimum(((z_1 - sought.depth) / sigma) ** 2, ceiling)

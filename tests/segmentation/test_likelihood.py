@@ -53,8 +53,8 @@ def test_light_has_one_price_a_superpixel(plate: tuple[Keyframe, Frame]) -> None
     brighter = replace(frame, color=np.full_like(frame.color, 132))
     witnesses = np.bincount(keyframe.owner, minlength=keyframe.count)
     witnesses = witnesses[witnesses > 0]
-    # 120 to 132: minimise n (132 - 120 f)^2 / 8 + c (f - 1)^2 over f, with c = 6 / 0.05^2.
-    c = 6 / 0.05**2
+    # 120 to 132: minimise n (132 - 120 f)^2 / 8 + c (f - 1)^2 over f, with c = 6 / 0.02^2 where nothing moves.
+    c = 6 / 0.02**2
     f = (witnesses * 120 * 132 / 8 + c) / (witnesses * 120**2 / 8 + c)
     # Depth's residual is 0 and its share of a pixel's cost 6 / 28.
     expected = (132 - 120 * f) ** 2 / 8 / f**2 + c * (f - 1) ** 2 / witnesses + 1 - 6 / 28
