@@ -98,9 +98,8 @@ class SegmentFolder:
                 self._scores = None
             whole = self._finish_video()
         if not whole:
-            raise OutputError(
-                f"cannot write to {self.path / VIDEO}: it could not be written whole: {os.strerror(errno.ENOSPC)}?"
-            )
+            why = f"it could not be written whole: {os.strerror(errno.ENOSPC)}?"
+            raise OutputError(f"cannot write to {self.path / VIDEO}: {why}")
 
     def close(self) -> None:
         """Finish what can be, and let others write there."""

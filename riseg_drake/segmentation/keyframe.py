@@ -39,7 +39,7 @@ class Keyframe(Immutable):
     region: Region
     """The part of the view that is cut: all that stands there."""
     height: NDArray[np.float32]
-    """[h, w] of the region, m above the table; what stands there without depth is as high as what is nearest."""
+    """[h, w] of the region, m above the table; what stands there without depth is as high as what is near."""
     superpixels: Superpixels
     """Of the region."""
     area: NDArray[np.intp]
