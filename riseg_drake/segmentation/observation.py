@@ -31,9 +31,9 @@ class ObservationParameters:
     alignment: AlignmentParameters = field(default_factory=AlignmentParameters)
     outlier: float = 0.02
     """Probability with which a superpixel's motion says nothing of its body."""
-    motion_cost: float = 30.0
-    """Nats that a motion must explain better than all others do, to be one: eight superpixels' worth:
-    errors of the view are common to neighbours."""
+    motion_cost: float = 20.0
+    """Nats that a motion must explain better than all others do, to be one: five superpixels' worth, as
+    errors are common to neighbours."""
     view_errors: float = 3.0
     """Errors of the view (`view_error`) that what moves must move by."""
     along: float = 0.2
