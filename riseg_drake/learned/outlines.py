@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.geometry.nearest import nearest_values
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.learned.prompts import Answer, PromptedSegmenter, intersection_over_union, prompt_of_mask
 
@@ -110,10 +111,6 @@ def _misfit(
     own = claim & ~contested & (depth > 0)
     if not own.any():
         return np.where(claim, 0.0, np.inf)
-    _, nearest = cv2.distanceTransformWithLabels(
-        (~own).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    depth_of = np.zeros(nearest.max() + 1)
-    depth_of[nearest[own]] = depth[own]
-    misfit = np.where(depth > 0, np.abs(depth - depth_of[nearest]), 0.0)
+    nearest, _ = nearest_values(depth.astype(float), own, cv2.DIST_MASK_5)
+    misfit = np.where(depth > 0, np.abs(depth - nearest), 0.0)
     return np.where(claim, misfit, np.inf)

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.geometry.nearest import nearest_values
 from riseg_drake.pushing.clustering import Clustering, ClusteringParameters, clusterings
 from riseg_drake.pushing.table_map import TableMap
 
@@ -127,13 +128,8 @@ def _by_nearest_core(mask: NDArray[np.bool_], core_of: NDArray) -> NDArray[np.in
     """For each cell of a mask the number (from 1) of the core [rows, columns] nearest to it."""
     if not core_of.any():
         return mask.astype(int)
-    # distanceTransform numbers the cells of the cores, not the cores.
-    _, nearest = cv2.distanceTransformWithLabels(
-        (core_of == 0).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    core_of_label = np.zeros(nearest.max() + 1, int)
-    core_of_label[nearest[core_of > 0]] = core_of[core_of > 0]
-    return np.where(mask, core_of_label[nearest], 0)
+    nearest, _ = nearest_values(core_of.astype(int), core_of > 0, cv2.DIST_MASK_5)
+    return np.where(mask, nearest, 0)
 
 
 def concavity(piece: NDArray[np.bool_], cell: float) -> float:

@@ -186,13 +186,13 @@ def _colored_like_things(
     what is dark: colour tells which are the thing's. That around them, as light and shadow are not everywhere
     the same.
     """
-    own = color[vu].astype(np.float32)
+    own, coarse = color[vu].astype(np.float32), (vu[0] // _EVERY, vu[1] // _EVERY)
     off, share = [], []
     for which in (thing, table):
         weight = which[_every(_EVERY)].astype(np.float32)
         total = cv2.blur(color[_every(_EVERY)] * weight[..., None], _AROUND)
-        share.append(cv2.blur(weight, _AROUND)[vu[0] // _EVERY, vu[1] // _EVERY])
-        mean = total[vu[0] // _EVERY, vu[1] // _EVERY] / np.maximum(share[-1], 1e-6)[:, None]
+        share.append(cv2.blur(weight, _AROUND)[coarse])
+        mean = total[coarse] / np.maximum(share[-1], 1e-6)[:, None]
         off.append(((own - mean) ** 2).sum(-1))
     return (share[0] > _FEW) & ((off[0] < _ALIKE * off[1]) | (share[1] < _FEW / 10))
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import Region, bounding_region
+from riseg_drake.geometry.nearest import nearest_values
 from riseg_drake.geometry.rgbd import Frame, Immutable
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.alignment import EdgePixels, edge_pixels, has_contrast
@@ -129,10 +130,6 @@ def _filled(height: NDArray[np.float32], inside: NDArray[np.bool_]) -> NDArray[n
     known = inside & np.isfinite(height)
     filled = np.nan_to_num(height)
     if known.any():
-        _, index = cv2.distanceTransformWithLabels(
-            (~known).view(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
-        )
-        nearest = np.zeros(index.max() + 1, np.float32)
-        nearest[index[known]] = height[known]
-        filled = np.where(inside & ~known, nearest[index], filled)
+        nearest, _ = nearest_values(height, known)
+        filled = np.where(inside & ~known, nearest, filled)
     return filled

@@ -6,7 +6,6 @@ are sharpened, on ever more of what they explain. A patch of a blank thing tells
 with all of what may be one body, whose outline and height tell.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -47,8 +46,8 @@ class MotionSearchParameters:
     """Valleys that are gone down."""
     unexplained: float = 3.0
     """Mean squared residuals from which a superpixel is not explained."""
-    weaker: list[float] = field(default_factory=lambda: [0.0, 0.5, 1.0, 1.5])
-    """Log-odds by which all bonds are weakened in turn, to see what may be a body."""
+    weaker: list[float] = field(default_factory=lambda: [0.5, 1.0, 1.5])
+    """Log-odds by which all bonds are weakened in turn, to see what else may be a body."""
     same_flow: float = 1.0
     """Pixels (root mean square) within which two motions are one, and what moves stands still."""
     rounds: int = 24
@@ -94,42 +93,31 @@ def search_motions(
         likelihood: see there.
         area_min: m^2; what is large enough for a body.
     """
-    search = _Search(keyframe, frame, above, depth_noise, parameters, likelihood)
-    costs = motion_costs(keyframe, frame, np.eye(4)[None], depth_noise, likelihood)
-    asked = costs.witnesses > likelihood.correlated_pixels
+    search = _Search(keyframe, frame, above, divisions, depth_noise, gain_min, parameters, likelihood)
+    asked = search.costs.witnesses > likelihood.correlated_pixels
     tried = np.zeros(keyframe.count, bool)
     pixels_min = area_min * keyframe.pixels_per_metre**2
-    found: list[NDArray] = []
-
-    def take(patch: NDArray[np.bool_], motion: tuple[float, NDArray, Costs] | None) -> bool:
-        nonlocal costs
-        if motion is None or motion[0] < gain_min or not search.differs(motion[1], found, patch):
-            return False
-        found.append(motion[1])
-        costs = costs.with_motion(motion[2])
-        return True
-
     for _ in range(parameters.rounds):
-        unexplained = (costs.misfit.min(0) > parameters.unexplained) & asked
+        unexplained = (search.costs.misfit.min(0) > parameters.unexplained) & asked
         patch, distance = search.densest_patch(unexplained & ~tried)
         if keyframe.area[patch].sum() < 0.2 * pixels_min:
             break
         tried |= patch & unexplained
-        if take(patch, search.best_motion(patch, distance, costs, divisions)):
+        if search.take(search.best_motion(patch, distance), patch):
             # What it did not explain may be tried with other neighbours.
-            tried &= costs.misfit.min(0) > parameters.unexplained
+            tried &= search.costs.misfit.min(0) > parameters.unexplained
     # Each superpixel of a blank body may be explained, by one motion or another, all of it by none.
     bodies = _possible_bodies(divisions, keyframe.area, pixels_min)
     while len(bodies):
-        short = (bodies @ costs.nats(likelihood).T).min(1)
+        short = (bodies @ search.costs.nats(likelihood).T).min(1)
         worst = int(short.argmax())
         if short[worst] < gain_min:
             break
         body, bodies = bodies[worst], np.delete(bodies, worst, axis=0)
-        take(body, search.best_motion(body, np.where(body, 0.0, np.inf), costs, divisions))
+        search.take(search.best_motion(body, np.where(body, 0.0, np.inf)), body)
     for motion in proposed_K:
-        take(np.zeros(keyframe.count, bool), search.sharpened(motion, costs, divisions))
-    return np.array(found).reshape(-1, 4, 4)
+        search.take(search.sharpened(motion), np.zeros(keyframe.count, bool))
+    return np.array(search.found).reshape(-1, 4, 4)
 
 
 def unexplained_parts(nats: NDArray[np.float64], part: NDArray[np.intp]) -> NDArray[np.float64]:
@@ -151,18 +139,21 @@ def _possible_bodies(divisions: NDArray[np.intp], area: NDArray[np.intp], area_m
 
 
 class _Search:
-    """A keyframe and a frame, prepared for many motions."""
+    """A keyframe and a frame, prepared for many motions, and those that were found."""
 
     def __init__(
         self,
         keyframe: Keyframe,
         frame: Frame,
         above: AboveTable,
+        divisions: NDArray[np.intp],
         depth_noise: float,
+        gain_min: float,
         parameters: MotionSearchParameters,
         likelihood: LikelihoodParameters,
     ):
         self._keyframe, self._frame, self._depth_noise = keyframe, frame, depth_noise
+        self._divisions, self._gain_min = divisions, gain_min
         self._parameters, self._likelihood = parameters, likelihood
         self._fit = rigid_fit(FramePair(keyframe.frame, frame), depth_noise)
         self._gray_0, self._gray_1 = (self._blurred(f.gray) for f in (keyframe.frame, frame))
@@ -178,6 +169,19 @@ class _Search:
         """[N, 2], m, of each superpixel, about."""
         self._standing = above.mask.astype(np.float32)
         self._normal = keyframe.frame.X_WC[:3, :3].T @ keyframe.above.plane_W[:3]
+        self.found: list[NDArray] = []
+        """Motions [4, 4]."""
+        self.costs = self._costs(np.eye(4))
+        """Of standing still, and of those."""
+
+    def take(self, motion: tuple[float, NDArray, Costs] | None, patch: NDArray[np.bool_]) -> bool:
+        """Add a motion [4, 4], with its gain, nats, and its costs, if it is worth it and takes a patch [N]
+        elsewhere than standing still and the others do."""
+        if motion is None or motion[0] < self._gain_min or not self._differs(motion[1], patch):
+            return False
+        self.found.append(motion[1])
+        self.costs = self.costs.with_motion(motion[2])
+        return True
 
     def densest_patch(self, among: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
         """Of some superpixels [N] those around where most of them lie, and the distance [N] from there, m."""
@@ -191,10 +195,10 @@ class _Search:
         return among & (distance < self._parameters.patch), distance
 
     def best_motion(
-        self, patch: NDArray[np.bool_], distance: NDArray[np.float64], costs: Costs, divisions: NDArray[np.intp]
+        self, patch: NDArray[np.bool_], distance: NDArray[np.float64]
     ) -> tuple[float, NDArray, Costs] | None:
         """What a patch [N] did: the gain, nats, the motion [4, 4], and its costs."""
-        best_known = costs.misfit.min(0)
+        best_known = self.costs.misfit.min(0)
         blank = not np.isfinite(distance).all()
         samples = self._parameters.samples * (3 if blank else 1)
         results = []
@@ -210,31 +214,29 @@ class _Search:
                     break
                 motion = fitted
             own = self._costs(motion)
-            results.append((self._gain(own, costs, divisions), motion, own))
+            results.append((self._gain(own), motion, own))
         # Gains end where noise begins; among those that are alike the patch itself tells.
-        weight = costs.witnesses * patch / (2 * self._likelihood.correlated_pixels)
+        weight = self.costs.witnesses * patch / (2 * self._likelihood.correlated_pixels)
         return max(results, key=lambda r: r[0] - float(weight @ r[2].misfit[0]), default=None)
 
-    def differs(self, motion: NDArray, others: Sequence[NDArray], patch: NDArray[np.bool_]) -> bool:
-        """Whether a motion takes a patch elsewhere than standing still and others [4, 4] do."""
+    def _differs(self, motion: NDArray, patch: NDArray[np.bool_]) -> bool:
+        """Whether a motion takes a patch elsewhere than standing still and what was found [4, 4] do."""
         p_KQ = self._keyframe.edges.p_C0Q
         mine = p_KQ[patch[self._keyframe.edges.piece]]
         p_KQ, focal_length = mine if len(mine) else p_KQ, self._frame.intrinsics.fx
         return all(
             flow_difference(p_KQ, motion, X, focal_length) > self._parameters.same_flow
-            for X in (np.eye(4), *others)
+            for X in (np.eye(4), *self.found)
         )
 
-    def sharpened(
-        self, motion: NDArray, costs: Costs, divisions: NDArray[np.intp]
-    ) -> tuple[float, NDArray, Costs]:
+    def sharpened(self, motion: NDArray) -> tuple[float, NDArray, Costs]:
         """A proposed motion [4, 4], made to fit what it explains: the gain, nats, the motion, and its costs."""
         mine = self._costs(motion).misfit[0]
-        better = (mine < self._parameters.unexplained + 1) & (mine < costs.misfit.min(0) - _BETTER)
+        better = (mine < self._parameters.unexplained + 1) & (mine < self.costs.misfit.min(0) - _BETTER)
         fitted = self._fitted(motion, better)
         motion = motion if fitted is None else fitted
         own = self._costs(motion)
-        return self._gain(own, costs, divisions), motion, own
+        return self._gain(own), motion, own
 
     def _fitted(self, motion: NDArray, members: NDArray[np.bool_]) -> NDArray | None:
         """A motion [4, 4] sharpened on the edges of some superpixels [N]; None where they have too few."""
@@ -244,13 +246,13 @@ class _Search:
         alignment = self._parameters.alignment
         return self._fit.align(self._keyframe.edges.subset(edges), motion, alignment.rounds, alignment)[0]
 
-    def _gain(self, own: Costs, costs: Costs, divisions: NDArray[np.intp]) -> float:
+    def _gain(self, own: Costs) -> float:
         """Nats by which a motion explains a part better, or superpixels wherever they are."""
-        nats = costs.with_motion(own).nats(self._likelihood)
+        nats = self.costs.with_motion(own).nats(self._likelihood)
         better = np.clip(nats[:-1].min(0) - nats[-1], 0, None)
         of_parts = [
             (unexplained_parts(nats[:-1], part) - unexplained_parts(nats, part)).max(initial=0)
-            for part in divisions
+            for part in self._divisions
         ]
         return float(max(better[own.misfit[0] < self._parameters.unexplained + 1].sum(), *of_parts))
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import pixel_grid
+from riseg_drake.geometry.nearest import nearest_values
 from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.effective_flow import effective_flow
@@ -135,9 +136,6 @@ def _nearest_seed_group(
     shape: tuple[int, ...], seeds: NDArray[np.intp], group: NDArray[np.intp]
 ) -> NDArray[np.intp]:
     """For each pixel the group of the seed nearest to it, [H, W]."""
-    away = np.ones(shape, np.uint8)
-    away[seeds[:, 0], seeds[:, 1]] = 0
-    _, index = cv2.distanceTransformWithLabels(away, cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL)
-    value = np.zeros(index.max() + 1, np.intp)
-    value[index[seeds[:, 0], seeds[:, 1]]] = group
-    return value[index]
+    own = np.full(shape, -1, np.intp)
+    own[seeds[:, 0], seeds[:, 1]] = group
+    return nearest_values(own, own >= 0)[0]

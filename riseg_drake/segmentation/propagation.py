@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import Intrinsics, bounding_region, project, rays
+from riseg_drake.geometry.nearest import nearest_values
 from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.geometry.se3 import inverse, move_points
 from riseg_drake.segmentation.above_table import AboveTable
@@ -116,13 +117,9 @@ def nearest_label(label: NDArray[np.uint16], inside: NDArray[np.bool_], reach: f
     empty = inside[region] & (old == 0)
     filled = np.where(empty, UNKNOWN, old)
     if empty.any() and old.any():
-        distance, index = cv2.distanceTransformWithLabels(
-            (old == 0).astype(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
-        )
-        known, near = np.flatnonzero(old), np.flatnonzero(empty & (distance <= reach))
-        value = np.zeros(index.max() + 1, np.uint16)
-        value[index.ravel()[known]] = old.ravel()[known]
-        filled.ravel()[near] = value[index.ravel()[near]]
+        nearest, distance = nearest_values(old, old > 0)
+        near = empty & (distance <= reach)
+        filled[near] = nearest[near]
     out[region] = filled
     return out
 

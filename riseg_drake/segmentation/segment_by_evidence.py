@@ -177,7 +177,7 @@ def _searched(
     depth_noise: float,
     parameters: EvidenceParameters,
 ) -> NDArray[np.float64]:
-    divisions = [
+    finer = [
         partition(belief.keyframe, belief.bond - by, parameters.belief.partition)
         for by in parameters.search.weaker
     ]
@@ -185,7 +185,7 @@ def _searched(
         belief.keyframe,
         frame,
         above,
-        np.array(divisions),
+        np.array([belief.part, *finer]),
         candidates_K,
         depth_noise,
         parameters.observation.motion_cost,

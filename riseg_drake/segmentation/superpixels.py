@@ -6,6 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.geometry.nearest import nearest_values
+
 _HEIGHT_STEPS = 2000.0
 """Gray levels a metre of height is worth beside colour: half a millimetre is one level."""
 _CRUMB = 5
@@ -55,12 +57,8 @@ def superpixels(
     own[v, u] = True
     flooded[v, u] = np.arange(len(v)) + 1
     # Ridges between basins, and rims that the outside has flooded, go to the nearest piece.
-    _, index = cv2.distanceTransformWithLabels(
-        (~own).astype(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    nearest = np.zeros(index.max() + 1, np.intp)
-    nearest[index[own]] = flooded[own]
-    label = np.where(mask, nearest[index], 0) - 1
+    nearest, _ = nearest_values(flooded.astype(np.intp), own)
+    label = np.where(mask, nearest, 0) - 1
     return _with_borders(label, len(v))
 
 

@@ -61,7 +61,7 @@ class Moved:
 
     def search(self, *proposed: np.ndarray) -> np.ndarray:
         parameters, search = ObservationParameters(), MotionSearchParameters()
-        divisions = [
+        finer = [
             partition(self.belief.keyframe, self.belief.bond - by, PartitionParameters())
             for by in search.weaker
         ]
@@ -69,7 +69,7 @@ class Moved:
             self.belief.keyframe,
             self.frame,
             self.above,
-            np.array(divisions),
+            np.array([self.belief.part, *finer]),
             np.array(proposed).reshape(-1, 4, 4),
             DEPTH_NOISE,
             parameters.motion_cost,
