@@ -10,16 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.rgbd import Frame
-from riseg_drake.geometry.se3 import inverse
-from riseg_drake.segmentation.frame_pairs import camera_span
-from riseg_drake.segmentation.keyframe import Keyframe
+from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.lighting import gray_costs
 from riseg_drake.segmentation.noise import depth_sigma
 from riseg_drake.segmentation.surface import seek
 
-ANOTHER_VIEW = 100.0
-"""Pixels of the camera's motion from which smooth errors of depth are others."""
+_SEEN = 0.25
+"""Pixels of motion that an image shows."""
 EXPECTED = 2.0
 """Squared residuals of gray and depth, both, where a motion is right."""
 
@@ -43,8 +40,9 @@ class LikelihoodParameters:
     chance: float = 1.5
     """Times the mean squared residual that is usual, up to which a superpixel's may be by chance."""
     view_error: float = 0.01
-    """Share of the camera's motion, pixels, and of depth from another view, by which what stands still seems to
-    have moved: poses err, and depth errs smoothly by the view (a per cent and more on real films)."""
+    """The least that is thought of the view's error, see `Comparison`."""
+    view_errors: float = 3.0
+    """So many times that depth may err, and what stands still may seem to have moved, at most."""
     superpixel_max: float = 4.0
     """Nats that one superpixel may say for a motion against another: its errors are its own."""
 
@@ -77,43 +75,54 @@ class Costs:
 
 
 def motion_costs(
-    keyframe: Keyframe,
-    frame: Frame,
-    motions_K: NDArray[np.float64],
-    depth_noise: float,
-    parameters: LikelihoodParameters,
+    compared: Comparison, motions_K: NDArray[np.float64], parameters: LikelihoodParameters
 ) -> Costs:
     """Costs of motions [G, 4, 4], given in the keyframe's camera K.
 
-    `depth_noise` is the standard deviation of depth at 1 m, m.
+    What stands still is nearer or farther than it was measured, by a few errors of the view, where that
+    explains it better: so it seems to move along its epipolar lines.
     """
-    X_C1K = inverse(frame.X_WC) @ keyframe.frame.X_WC
-    gray_1, depth_1 = frame.unhidden_gray, frame.unhidden_depth
-    ceiling = np.float32(parameters.residual_max)
-    span = camera_span(keyframe.frame, frame)
-    shift = np.float32(parameters.view_error * span)
-    per_variance = 1 / (keyframe.variance + shift**2 * keyframe.gradient_squared)
-    smooth = np.float32(parameters.view_error * min(1.0, span / ANOTHER_VIEW))
-    of_depth = np.float32(parameters.correlated_pixels / parameters.correlated_depth)
-    witnesses = np.bincount(keyframe.owner, minlength=keyframe.count).astype(float)
+    keyframe = compared.keyframe
+    errs = parameters.view_errors * compared.view_error
+    depth_factors = (1.0, 1 - errs, 1 + errs) if parameters.view_errors * compared.shift > _SEEN else (1.0,)
     misfit = np.full((len(motions_K), keyframe.count), EXPECTED)
     for mean, motion in zip(misfit, motions_K, strict=True):
-        light = parameters.light_still if np.array_equal(motion, np.eye(4)) else parameters.light
-        sought = seek(keyframe.witnesses, X_C1K @ motion)
-        z_1 = sought.read(depth_1)
-        photometric = gray_costs(
-            keyframe.gray,
-            sought.read_between(gray_1),
-            per_variance,
-            keyframe.owner,
-            keyframe.count,
-            parameters.residual_max,
-            parameters.correlated_pixels / light**2,
-        )
-        sigma = np.hypot(depth_sigma(sought.depth, float(np.sqrt(2)) * depth_noise), smooth * sought.depth)
-        geometric = np.minimum(((z_1 - sought.depth) / sigma) ** 2, ceiling)
-        both = photometric + np.where(z_1 > 0, 1 + of_depth * (geometric - 1), np.float32(1))
-        # What cannot be compared speaks neither for nor against: the value expected of a match.
-        total = np.bincount(keyframe.owner, np.where(np.isnan(both), EXPECTED, both), keyframe.count)
-        np.divide(total, witnesses, out=mean, where=witnesses > 0)
-    return Costs(misfit, witnesses)
+        if np.array_equal(motion, np.eye(4)):
+            tries = [_misfit(compared, motion, f, parameters.light_still, parameters) for f in depth_factors]
+            mean[:] = np.min(tries, axis=0)
+        else:
+            mean[:] = _misfit(compared, motion, 1.0, parameters.light, parameters)
+    return Costs(misfit, np.bincount(keyframe.owner, minlength=keyframe.count).astype(float))
+
+
+def _misfit(
+    compared: Comparison,
+    motion_K: NDArray[np.float64],
+    depth_factor: float,
+    light: float,
+    parameters: LikelihoodParameters,
+) -> NDArray[np.float64]:
+    """Mean squared residuals [N] of a motion [4, 4], where depth is really that of both views by a factor, and
+    light changes by a factor of the standard deviation `light`."""
+    keyframe, frame = compared.keyframe, compared.frame
+    sought = seek(keyframe.witnesses, compared.X_C1K @ motion_K, depth_factor)
+    z_1 = sought.read(frame.unhidden_depth)
+    photometric = gray_costs(
+        keyframe.gray,
+        sought.read_between(frame.unhidden_gray),
+        1 / (keyframe.variance + np.float32(compared.shift) ** 2 * keyframe.gradient_squared),
+        keyframe.owner,
+        keyframe.count,
+        parameters.residual_max,
+        parameters.correlated_pixels / light**2,
+    )
+    z = sought.depth / np.float32(depth_factor)  # as it is measured
+    noise = float(np.sqrt(2)) * compared.depth_noise
+    sigma = np.hypot(depth_sigma(z, noise), np.float32(compared.depth_error) * z)
+    geometric = np.minimum(((z_1 - z) / sigma) ** 2, np.float32(parameters.residual_max))
+    of_depth = np.float32(parameters.correlated_pixels / parameters.correlated_depth)
+    both = photometric + np.where(z_1 > 0, 1 + of_depth * (geometric - 1), np.float32(1))
+    # What cannot be compared speaks neither for nor against: the value expected of a match.
+    total = np.bincount(keyframe.owner, np.where(np.isnan(both), EXPECTED, both), keyframe.count)
+    witnesses = np.bincount(keyframe.owner, minlength=keyframe.count)
+    return np.divide(total, witnesses, out=np.full(keyframe.count, EXPECTED), where=witnesses > 0)

@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 
 from riseg_drake.geometry.camera import rays
-from riseg_drake.geometry.rgbd import Frame, FramePair
-from riseg_drake.geometry.se3 import inverse, skew
+from riseg_drake.geometry.se3 import skew
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.alignment import AlignmentParameters, rigid_fit
-from riseg_drake.segmentation.keyframe import Keyframe
+from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.likelihood import EXPECTED, Costs, LikelihoodParameters, motion_costs
 from riseg_drake.segmentation.motions import flow_difference
 
@@ -68,12 +67,10 @@ _GROWTH = (1.0, 1.4, 4.0, 50.0)
 
 
 def search_motions(
-    keyframe: Keyframe,
-    frame: Frame,
+    compared: Comparison,
     above: AboveTable,
     divisions: NDArray[np.intp],
     proposed_K: NDArray[np.float64],
-    depth_noise: float,
     gain_min: float,
     parameters: MotionSearchParameters,
     likelihood: LikelihoodParameters,
@@ -82,18 +79,17 @@ def search_motions(
     """Motions [C, 4, 4] in the keyframe's camera that explain what standing still does not.
 
     Args:
-        keyframe: at the rest before.
-        frame: at the rest after.
+        compared: the keyframe, at the rest before, and the frame, at the rest after.
         above: objMask of that frame.
         divisions: [L, N], 0.., ways to tell which superpixels are one body.
         proposed_K: [G, 4, 4], what was seen in motion; taken where it explains what nothing found does.
-        depth_noise: standard deviation of depth at 1 m, m.
         gain_min: nats that a motion must bring.
         parameters: see there.
         likelihood: see there.
         area_min: m^2; what is large enough for a body.
     """
-    search = _Search(keyframe, frame, above, divisions, depth_noise, gain_min, parameters, likelihood)
+    keyframe = compared.keyframe
+    search = _Search(compared, above, divisions, gain_min, parameters, likelihood)
     asked = search.costs.witnesses > likelihood.correlated_pixels
     tried = np.zeros(keyframe.count, bool)
     pixels_min = area_min * keyframe.pixels_per_metre**2
@@ -143,19 +139,18 @@ class _Search:
 
     def __init__(
         self,
-        keyframe: Keyframe,
-        frame: Frame,
+        compared: Comparison,
         above: AboveTable,
         divisions: NDArray[np.intp],
-        depth_noise: float,
         gain_min: float,
         parameters: MotionSearchParameters,
         likelihood: LikelihoodParameters,
     ):
-        self._keyframe, self._frame, self._depth_noise = keyframe, frame, depth_noise
+        self._compared = compared
+        self._keyframe, self._frame = keyframe, frame = compared.keyframe, compared.frame
         self._divisions, self._gain_min = divisions, gain_min
         self._parameters, self._likelihood = parameters, likelihood
-        self._fit = rigid_fit(FramePair(keyframe.frame, frame), depth_noise)
+        self._fit = rigid_fit(compared.pair, compared.depth_noise)
         self._gray_0, self._gray_1 = (self._blurred(f.gray) for f in (keyframe.frame, frame))
         gradient = np.hypot(
             *(cv2.Sobel(keyframe.frame.gray, cv2.CV_32F, *d, scale=0.125) for d in ((1, 0), (0, 1)))
@@ -257,7 +252,7 @@ class _Search:
         return float(max(better[own.misfit[0] < self._parameters.unexplained + 1].sum(), *of_parts))
 
     def _costs(self, motion: NDArray) -> Costs:
-        return motion_costs(self._keyframe, self._frame, motion[None], self._depth_noise, self._likelihood)
+        return motion_costs(self._compared, motion[None], self._likelihood)
 
     def _valleys(self, patch: NDArray[np.bool_], samples: int) -> list[NDArray]:
         """The best motions [4, 4] on the grid of slides and turns."""
@@ -308,7 +303,7 @@ class _Search:
         z_1 = cv2.remap(frame.unhidden_depth, u, v, cv2.INTER_NEAREST, borderValue=0)
         most = self._likelihood.residual_max
         cost = np.minimum((found - gray) ** 2 / variance, most)
-        sigma = np.float32(2 * np.sqrt(2) * self._depth_noise) * z**2
+        sigma = np.float32(2 * np.sqrt(2) * self._compared.depth_noise) * z**2
         cost += np.where(z_1 > 0, np.minimum(((z_1 - z) / sigma) ** 2, most), EXPECTED / 2)
         return cost.mean(1)
 
@@ -317,7 +312,7 @@ class _Search:
         frame = self._frame
         k = frame.intrinsics
         K = np.array([[k.fx, 0, k.cx], [0, k.fy, k.cy], [0, 0, 1]])
-        P = (K @ (inverse(frame.X_WC) @ self._keyframe.frame.X_WC @ motions)[:, :3]).astype(np.float32)
+        P = (K @ (self._compared.X_C1K @ motions)[:, :3]).astype(np.float32)
         homogeneous = np.column_stack([p_KQ, np.ones(len(p_KQ))]).astype(np.float32)
         zu, zv, z = np.moveaxis((P.reshape(-1, 4) @ homogeneous.T).reshape(len(P), 3, -1), 1, 0)
         u, v = zu / z, zv / z

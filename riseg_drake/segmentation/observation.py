@@ -14,11 +14,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
+from riseg_drake.geometry.rgbd import Immutable
 from riseg_drake.segmentation.alignment import AlignmentParameters, align_motions
-from riseg_drake.segmentation.frame_pairs import camera_span
+from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.keyframe import Keyframe
-from riseg_drake.segmentation.likelihood import ANOTHER_VIEW, LikelihoodParameters, motion_costs
+from riseg_drake.segmentation.likelihood import LikelihoodParameters, motion_costs
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.potts import PottsGraph, potts_labels
 
@@ -34,8 +34,6 @@ class ObservationParameters:
     motion_cost: float = 20.0
     """Nats that a motion must explain better than all others do, to be one: five superpixels' worth, as
     errors are common to neighbours."""
-    view_errors: float = 3.0
-    """Errors of the view (`view_error`) that what moves must move by."""
     along: float = 0.2
     """rho(k | k) of a motion: probability with which a thing pushes its neighbour along as if they were one."""
     stays: float = 0.8
@@ -67,33 +65,30 @@ class Observation(Immutable):
 
 
 def observe(
-    keyframe: Keyframe,
-    frame: Frame,
+    compared: Comparison,
     bond: NDArray[np.float64],
     part: NDArray[np.intp],
     candidates_K: NDArray[np.float64],
-    depth_noise: float,
     parameters: ObservationParameters,
 ) -> Observation:
     """Explain a frame by standing still and some of the candidate motions.
 
     Args:
-        keyframe: what to explain.
-        frame: the frame.
+        compared: the keyframe, which is explained, and the frame.
         bond: [M], log-odds of each border so far.
         part: [N], 0.., which superpixels are one body so far.
         candidates_K: [C, 4, 4], motions since the keyframe, seen from its camera.
-        depth_noise: standard deviation of depth at 1 m, m.
         parameters: see there.
     """
+    keyframe = compared.keyframe
     candidates_K = candidates_K.reshape(-1, 4, 4)
     if len(candidates_K):
-        pair = FramePair(keyframe.frame, frame)
-        candidates_K = align_motions(pair, keyframe.edges, candidates_K, depth_noise, parameters.alignment)
+        candidates_K = align_motions(
+            compared.pair, keyframe.edges, candidates_K, compared.depth_noise, parameters.alignment
+        )
     motions_K = np.concatenate([np.eye(4)[None], candidates_K])
-    costs = motion_costs(keyframe, frame, motions_K, depth_noise, parameters.likelihood)
-    nats = costs.nats(parameters.likelihood)
-    moves = _more_than_the_view_errs(keyframe, frame, motions_K, nats, parameters)
+    nats = motion_costs(compared, motions_K, parameters.likelihood).nats(parameters.likelihood)
+    moves = _more_than_the_view_errs(compared, motions_K, nats, parameters.likelihood.view_errors)
     motions_K, nats = motions_K[moves], nats[moves]
     needed, motion = _fewest_motions(nats, keyframe, bond, part, parameters)
     nats = nats[needed]
@@ -102,7 +97,7 @@ def observe(
     share[0] = max(share[0], parameters.still_share)
     share /= share.sum()
     q = motion_posterior(nats, share, parameters.outlier)
-    focal_length, p_KQ = frame.intrinsics.fx, keyframe.edges.p_C0Q[::10]
+    focal_length, p_KQ = compared.frame.intrinsics.fx, keyframe.edges.p_C0Q[::10]
     spans = [flow_difference(p_KQ, X, np.eye(4), focal_length) if len(p_KQ) else 0.0 for X in motions_K[needed]]
     return Observation(
         motions_K=motions_K[needed],
@@ -114,17 +109,12 @@ def observe(
 
 
 def _more_than_the_view_errs(
-    keyframe: Keyframe,
-    frame: Frame,
-    motions_K: NDArray[np.float64],
-    nats: NDArray[np.float64],
-    parameters: ObservationParameters,
+    compared: Comparison, motions_K: NDArray[np.float64], nats: NDArray[np.float64], view_errors: float
 ) -> NDArray[np.bool_]:
     """Which motions [G] move what they explain better than standing still does, the first, by more pixels than
     it may seem to move from another view; standing still is among them."""
-    span = min(camera_span(keyframe.frame, frame), ANOTHER_VIEW)
-    least = parameters.view_errors * parameters.likelihood.view_error * span
-    edges, focal_length = keyframe.edges, frame.intrinsics.fx
+    least = view_errors * compared.shift
+    edges, focal_length = compared.keyframe.edges, compared.frame.intrinsics.fx
     moves = np.ones(len(motions_K), bool)
     for k in range(1, len(motions_K)):
         p_KQ = edges.p_C0Q[(nats[k] < nats[0])[edges.piece]]

@@ -29,6 +29,7 @@ from riseg_drake.segmentation.belief import (
 )
 from riseg_drake.segmentation.bfif import BFIFParameters
 from riseg_drake.segmentation.candidates import candidate_motions
+from riseg_drake.segmentation.comparison import Comparison, renewed_view_error
 from riseg_drake.segmentation.frame_pairs import camera_span
 from riseg_drake.segmentation.memory import Memory, draw_memory, moved_memory, remember
 from riseg_drake.segmentation.motion_search import MotionSearchParameters, search_motions
@@ -84,6 +85,7 @@ def segment_by_evidence(
     if before.belief is None:
         return _begin(before, frame, above_1, parameters, bfif)
     now = _with_rest(before, frame, above_1, parameters, bfif)
+    now = replace(now, view_error=renewed_view_error(now.view_error, pair))
     belief, bodies = now.belief, _bodies_before(now)
     assert belief is not None
     candidates_K = candidate_motions(
@@ -104,17 +106,20 @@ def segment_by_evidence(
             or _leaves_keyframe(belief, bodies, frame, above_1, parameters)
         )
     )
-    depth_noise = max(above_1.depth_noise, belief.keyframe.above.depth_noise)
+    compared = Comparison(
+        belief.keyframe,
+        frame,
+        depth_noise=max(above_1.depth_noise, belief.keyframe.above.depth_noise),
+        view_error=now.view_error.share(parameters.observation.likelihood.view_error),
+    )
     if len(candidates_K) and not deciding:
-        seen, bodies = _explained(belief, frame, candidates_K, bodies, depth_noise, parameters)
+        seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters)
         deciding = _has_gone_far(now, frame, seen, bodies, parameters)
     if deciding:
-        candidates_K = _searched(belief, frame, above_1, candidates_K, depth_noise, parameters)
+        candidates_K = _searched(belief, compared, above_1, candidates_K, parameters)
         if len(candidates_K):
             at_rest = now.still_since is not None
-            seen, bodies = _explained(
-                belief, frame, candidates_K, bodies, depth_noise, parameters, at_rest=at_rest
-            )
+            seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters, at_rest=at_rest)
     return _carried(now, pair, above_1, seen, bodies, deciding, parameters, bfif)
 
 
@@ -154,27 +159,23 @@ def _bodies_before(now: Segmentation) -> Bodies:
 
 def _explained(
     belief: Belief,
-    frame: Frame,
+    compared: Comparison,
     candidates_K: NDArray[np.float64],
     before: Bodies,
-    depth_noise: float,
     parameters: EvidenceParameters,
     *,
     at_rest: bool = False,
 ) -> tuple[Observation, Bodies]:
     """What a frame says, given some motions [C, 4, 4], and the bodies by it."""
-    seen = observe(
-        belief.keyframe, frame, belief.bond, belief.part, candidates_K, depth_noise, parameters.observation
-    )
+    seen = observe(compared, belief.bond, belief.part, candidates_K, parameters.observation)
     return bodies_of(belief, seen, before, parameters.belief, at_rest=at_rest)
 
 
 def _searched(
     belief: Belief,
-    frame: Frame,
+    compared: Comparison,
     above: AboveTable,
     candidates_K: NDArray[np.float64],
-    depth_noise: float,
     parameters: EvidenceParameters,
 ) -> NDArray[np.float64]:
     finer = [
@@ -182,12 +183,10 @@ def _searched(
         for by in parameters.search.weaker
     ]
     return search_motions(
-        belief.keyframe,
-        frame,
+        compared,
         above,
         np.array([belief.part, *finer]),
         candidates_K,
-        depth_noise,
         parameters.observation.motion_cost,
         parameters.search,
         parameters.observation.likelihood,

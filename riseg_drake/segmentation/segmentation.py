@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from riseg_drake.geometry.rgbd import Frame, Immutable
 from riseg_drake.segmentation.belief import Belief, Bodies
+from riseg_drake.segmentation.comparison import ViewError
 from riseg_drake.segmentation.memory import Memory
 from riseg_drake.segmentation.propagation import UNKNOWN
 
@@ -34,6 +35,8 @@ class Segmentation(Immutable):
     """s; None while something moves."""
     decided: bool = True
     """Whether the present rest has been looked at."""
+    view_error: ViewError = field(default_factory=ViewError)
+    """What the pairs so far have shown of it."""
     memory: Memory = field(default_factory=dict)
     """Points of objects that the keyframe does not see, as of its time."""
     at_reference: tuple[int, NDArray[np.uint16]] | None = None

@@ -84,10 +84,15 @@ def _rows_of_pixels(
     return SurfacePixels(pixel, depth, intrinsics, homogeneous)
 
 
-def seek(pixels: SurfacePixels, X_C1C0: NDArray[np.float64]) -> Sought:
-    """Where the points behind some pixels of C0 appear in C1, if X_C1C0 [4, 4] takes them there."""
-    a, b, c = pixel_projection(X_C1C0, pixels.intrinsics) @ pixels.homogeneous
-    depth = pixels.depth * c[: len(pixels)]
+def seek(pixels: SurfacePixels, X_C1C0: NDArray[np.float64], depth_factor: float = 1.0) -> Sought:
+    """Where the points behind some pixels of C0 appear in C1, if X_C1C0 [4, 4] takes them there.
+
+    Their depth is really the measured one by a factor.
+    """
+    projection = pixel_projection(X_C1C0, pixels.intrinsics)
+    projection[:, 3] /= depth_factor
+    a, b, c = projection @ pixels.homogeneous
+    depth = pixels.depth * np.float32(depth_factor) * c[: len(pixels)]
     if c.min() <= 0:
         # What is not ahead of the camera is sought far outside the image.
         a, b, c = np.where(c > 0, (a, b, c), np.array([[-1e4], [-1e4], [1]], np.float32))

@@ -66,6 +66,7 @@ def stoppables(place: Path) -> dict[str, Stoppable]:
     robot["station"]["camera"] |= {"width": 320, "rate": 5.0}
     robot["station"]["command"]["safety"]["image_age"] = 5.0  # on a busy machine the arm would pause for ever
     robot["arm"]["most_interactions"] = 1
+    robot["longest"] = 24 * 3600.0
     (place / "robot.yaml").write_text(
         yaml.safe_dump(robot).replace("station:", "station: !HardwareStationConfig")
     )

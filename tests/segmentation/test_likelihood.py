@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe
 from riseg_drake.segmentation.likelihood import Costs, LikelihoodParameters, motion_costs
 from riseg_drake.segmentation.noise import MeasurementNoise
@@ -30,7 +31,8 @@ def plate() -> tuple[Keyframe, Frame]:
 
 def costs(keyframe: Keyframe, frame: Frame, **parameters: float) -> np.ndarray:
     """Mean squared residuals of the superpixels that have witnesses."""
-    misfit = motion_costs(keyframe, frame, STILL, DEPTH_NOISE, LikelihoodParameters(**parameters)).misfit[0]
+    compared = Comparison(keyframe, frame, DEPTH_NOISE, view_error=0.01)
+    misfit = motion_costs(compared, STILL, LikelihoodParameters(**parameters)).misfit[0]
     return misfit[np.bincount(keyframe.owner, minlength=keyframe.count) > 0]
 
 
@@ -60,6 +62,26 @@ def test_light_has_one_price_a_superpixel(plate: tuple[Keyframe, Frame]) -> None
     expected = (132 - 120 * f) ** 2 / 8 / f**2 + c * (f - 1) ** 2 / witnesses + 1 - 6 / 28
     # In the old light it would be 18 a pixel, of which 9 count: for the smallest superpixels that is less.
     np.testing.assert_allclose(costs(keyframe, brighter), np.minimum(expected, 9 + 1 - 6 / 28), rtol=0.02)
+
+
+@pytest.mark.parametrize("measured", [0.97, 1.0, 1.03, 0.9])
+def test_what_stands_still_may_be_nearer_or_farther_than_measured_in_both_views(measured: float) -> None:
+    scene = DrawnScene([(0.1, 0.1, 0.03)])
+    frames = [scene.frame(n, looking_down(x), [planar(0, 0)])[0] for n, x in enumerate((0.0, 0.06))]
+    near, aside = (replace(f, depth=f.depth * np.float32(measured)) for f in frames)
+    above = standing(near, near.depth < measured * 0.44)
+    keyframe = make_keyframe(near, above, MeasurementNoise(), KeyframeParameters())
+    # Gray and depth as they should be: 0 and 1 - 6 / 28, and a little for interpolation.
+    right = pytest.approx(1 - 6 / 28, abs=0.02)
+    # 6 cm aside are 44 pixels; 3 % of them are a motion of 1.3.
+    assert bool(np.median(costs(keyframe, aside, view_errors=0.0)) == right) is (measured == 1)
+    # Three errors of 1 % are allowed, and 10 % are not.
+    assert bool(np.median(costs(keyframe, aside)) == right) is (measured != 0.9)
+
+
+def test_a_camera_that_stands_shows_nothing_of_how_depth_errs(plate: tuple[Keyframe, Frame]) -> None:
+    keyframe, frame = plate
+    np.testing.assert_array_equal(costs(keyframe, frame), costs(keyframe, frame, view_errors=0.0))
 
 
 def test_nats_are_squared_residuals_by_what_is_usual_and_no_more_than_a_superpixel_may_say() -> None:

@@ -5,6 +5,7 @@ import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
 from riseg_drake.segmentation.belief import BeliefParameters, first_belief
+from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.motion_search import (
     MotionSearchParameters,
     search_motions,
@@ -54,9 +55,10 @@ class Moved:
         scene = DrawnScene(SIZES, textures=textures or [])
         poses = [planar(*after[k]) if k in after else X for k, X in enumerate(PLACES)]
         pair, self.label, label_1 = scene.pair((OVER, OVER), (PLACES, poses), np.random.default_rng(0))
-        self.frame, self.above = pair.current, standing(pair.current, label_1 > 0)
+        self.above = standing(pair.current, label_1 > 0)
         above = standing(pair.reference, self.label > 0)
         self.belief = first_belief(pair.reference, above, MeasurementNoise(), BeliefParameters())
+        self.compared = Comparison(self.belief.keyframe, pair.current, DEPTH_NOISE, view_error=0.01)
         self.motions_K = {k: motion_seen_from(OVER, PLACES[k], poses[k]) for k in after}
 
     def search(self, *proposed: np.ndarray) -> np.ndarray:
@@ -66,12 +68,10 @@ class Moved:
             for by in search.weaker
         ]
         return search_motions(
-            self.belief.keyframe,
-            self.frame,
+            self.compared,
             self.above,
             np.array([self.belief.part, *finer]),
             np.array(proposed).reshape(-1, 4, 4),
-            DEPTH_NOISE,
             parameters.motion_cost,
             search,
             parameters.likelihood,
@@ -133,13 +133,7 @@ def test_boxes_get_their_motions_and_borders_inside_them_hold():
     moved = Moved(FAR)
     keyframe = moved.belief.keyframe
     seen = observe(
-        keyframe,
-        moved.frame,
-        moved.belief.bond,
-        moved.belief.part,
-        moved.search(),
-        DEPTH_NOISE,
-        ObservationParameters(),
+        moved.compared, moved.belief.bond, moved.belief.part, moved.search(), ObservationParameters()
     )
     truth = np.array(
         [

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from riseg_drake.segmentation.belief import BeliefParameters, first_belief
+from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.observation import (
     ObservationParameters,
@@ -79,7 +80,6 @@ def test_a_pixel_and_a_half_are_a_motion_unless_the_view_is_another_one(aside: f
     above = standing(pair.reference, label > 0)
     belief = first_belief(pair.reference, above, MeasurementNoise(), BeliefParameters())
     moved = motion_seen_from(cameras[0], places[0], there[0])
-    seen = observe(
-        belief.keyframe, pair.current, belief.bond, belief.part, moved, 0.0023, ObservationParameters()
-    )
+    compared = Comparison(belief.keyframe, pair.current, depth_noise=0.0023, view_error=0.01)
+    seen = observe(compared, belief.bond, belief.part, moved, ObservationParameters())
     assert (len(seen.motions_K) == 2) is is_one

@@ -1,0 +1,83 @@
+"""A keyframe and a frame: what is compared, and how far measurements differ where nothing has moved.
+
+From another view what stands still seems to have moved a little: poses err, and depth errs smoothly, by a per
+cent and more on real films. How much that is, as a share of the camera's own motion in the image, shows where
+the poses are set right by the images (`camera_motion`): in what is left between expected and observed flow of
+what stands still.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
+from riseg_drake.segmentation.frame_pairs import camera_span
+from riseg_drake.segmentation.keyframe import Keyframe
+
+_ANOTHER_VIEW = 100.0
+"""Pixels of the camera's motion from which smooth errors of depth are others."""
+_PAIRS = 30.0
+"""Over about so many pairs is the view's error measured."""
+_SPAN_ASSUMED = 20.0
+"""Pixels of the camera's motion in a pair that would say what is assumed before any has said something."""
+
+
+@dataclass(frozen=True)
+class ViewError(Immutable):
+    """What pairs of frames have shown of the view's error."""
+
+    residual_squares: float = 0.0
+    """Sum of the squared residuals of flow where nothing moves, pixels^2."""
+    span_squares: float = 0.0
+    """Sum of the camera's squared motions in the image, pixels^2."""
+
+    def share(self, assumed: float) -> float:
+        """The view's error, a share of the camera's motion in the image; what was `assumed` at least."""
+        squares = self.residual_squares + (assumed * _SPAN_ASSUMED) ** 2
+        return max(assumed, float(np.sqrt(squares / (self.span_squares + _SPAN_ASSUMED**2))))
+
+
+def renewed_view_error(known: ViewError, pair: FramePair) -> ViewError:
+    """The view's error in the light of one more pair; those whose poses are taken as they are say nothing."""
+    if pair.residual == 0:
+        return known
+    kept = 1 - 1 / _PAIRS
+    return ViewError(
+        kept * known.residual_squares + pair.residual**2,
+        kept * known.span_squares + camera_span(pair.reference, pair.current) ** 2,
+    )
+
+
+@dataclass(frozen=True)
+class Comparison(Immutable):
+    """A keyframe, in whose camera K motions are given, and a frame."""
+
+    keyframe: Keyframe
+    frame: Frame
+    depth_noise: float
+    """Standard deviation of depth at 1 m, m."""
+    view_error: float
+    """Share of the camera's motion, pixels, and of depth from another view, by which what stands still seems to
+    have moved."""
+
+    @property
+    def pair(self) -> FramePair:
+        """The keyframe's own frame and the other one."""
+        return FramePair(self.keyframe.frame, self.frame)
+
+    @property
+    def X_C1K(self) -> NDArray[np.float64]:
+        """[4, 4], from the keyframe's camera to the frame's, as the poses have it."""
+        return self.pair.X_C1C0
+
+    @cached_property
+    def shift(self) -> float:
+        """Pixels by which what stands still seems to have moved."""
+        return self.view_error * min(camera_span(self.keyframe.frame, self.frame), _ANOTHER_VIEW)
+
+    @property
+    def depth_error(self) -> float:
+        """Share of depth by which it errs otherwise than in the keyframe."""
+        return self.shift / _ANOTHER_VIEW
