@@ -43,6 +43,9 @@ class LikelihoodParameters:
     """The least that is thought of the view's error, see `Comparison`."""
     view_errors: float = 3.0
     """So many times that depth may err, and what stands still may seem to have moved, at most."""
+    hidden: float = 1.0
+    """Times the mean squared residual that is usual, by which a witness is worse that cannot be compared: few
+    things go just where nobody can see them."""
     superpixel_max: float = 4.0
     """Nats that one superpixel may say for a motion against another: its errors are its own."""
 
@@ -55,10 +58,13 @@ class Costs:
     """[G, N], mean squared residuals of each superpixel's witnesses: 2 where a motion is right, 18 at most."""
     witnesses: NDArray[np.float64]
     """[N], how many witnesses each superpixel has."""
+    hidden: NDArray[np.float64]
+    """[G, N], share of them that cannot be compared: behind the robot, or outside the image."""
 
     def with_motion(self, other: "Costs") -> "Costs":
         """These and other motions, for the same superpixels."""
-        return Costs(np.vstack([self.misfit, other.misfit]), self.witnesses)
+        misfit, hidden = np.vstack([self.misfit, other.misfit]), np.vstack([self.hidden, other.hidden])
+        return Costs(misfit, self.witnesses, hidden)
 
     def nats(self, parameters: LikelihoodParameters) -> NDArray[np.float64]:
         """[G, N], how much worse than the best each motion is, by the noise that is there, bounded.
@@ -68,7 +74,7 @@ class Costs:
         """
         asked = self.witnesses > parameters.correlated_pixels
         level = float(np.median(self.misfit.min(0)[asked])) if asked.any() else EXPECTED
-        misfit = np.maximum(self.misfit, parameters.chance * level)
+        misfit = np.maximum(self.misfit, parameters.chance * level) + parameters.hidden * level * self.hidden
         dispersion = max(1.0, level / EXPECTED)
         scale = self.witnesses / (2 * parameters.correlated_pixels * dispersion)
         return np.minimum((misfit - misfit.min(0)) * scale, parameters.superpixel_max)
@@ -85,14 +91,15 @@ def motion_costs(
     keyframe = compared.keyframe
     errs = parameters.view_errors * compared.view_error
     depth_factors = (1.0, 1 - errs, 1 + errs) if parameters.view_errors * compared.shift > _SEEN else (1.0,)
-    misfit = np.full((len(motions_K), keyframe.count), EXPECTED)
-    for mean, motion in zip(misfit, motions_K, strict=True):
-        if np.array_equal(motion, np.eye(4)):
-            tries = [_misfit(compared, motion, f, parameters.light_still, parameters) for f in depth_factors]
-            mean[:] = np.min(tries, axis=0)
-        else:
-            mean[:] = _misfit(compared, motion, 1.0, parameters.light, parameters)
-    return Costs(misfit, np.bincount(keyframe.owner, minlength=keyframe.count).astype(float))
+    misfit, hidden = np.empty((2, len(motions_K), keyframe.count))
+    for k, motion in enumerate(motions_K):
+        still = np.array_equal(motion, np.eye(4))
+        light = parameters.light_still if still else parameters.light
+        factors = depth_factors if still else (1.0,)
+        tries = [_misfit(compared, motion, factor, light, parameters) for factor in factors]
+        misfit[k], hidden[k] = np.min([t[0] for t in tries], axis=0), tries[0][1]
+    witnesses = np.bincount(keyframe.owner, minlength=keyframe.count).astype(float)
+    return Costs(misfit, witnesses, hidden)
 
 
 def _misfit(
@@ -101,9 +108,12 @@ def _misfit(
     depth_factor: float,
     light: float,
     parameters: LikelihoodParameters,
-) -> NDArray[np.float64]:
-    """Mean squared residuals [N] of a motion [4, 4], where depth is really that of both views by a factor, and
-    light changes by a factor of the standard deviation `light`."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean squared residuals [N] of a motion [4, 4], and the share [N] of witnesses that cannot be compared.
+
+    Depth is really that of both views by a factor, and light changes by a factor of the standard deviation
+    `light`.
+    """
     keyframe, frame = compared.keyframe, compared.frame
     sought = seek(keyframe.witnesses, compared.X_C1K @ motion_K, depth_factor)
     z_1 = sought.read(frame.unhidden_depth)
@@ -122,7 +132,8 @@ def _misfit(
     geometric = np.minimum(((z_1 - z) / sigma) ** 2, np.float32(parameters.residual_max))
     of_depth = np.float32(parameters.correlated_pixels / parameters.correlated_depth)
     both = photometric + np.where(z_1 > 0, 1 + of_depth * (geometric - 1), np.float32(1))
-    # What cannot be compared speaks neither for nor against: the value expected of a match.
-    total = np.bincount(keyframe.owner, np.where(np.isnan(both), EXPECTED, both), keyframe.count)
+    lost = np.isnan(both)
+    total = np.bincount(keyframe.owner, np.where(lost, EXPECTED, both), keyframe.count)
     witnesses = np.bincount(keyframe.owner, minlength=keyframe.count)
-    return np.divide(total, witnesses, out=np.full(keyframe.count, EXPECTED), where=witnesses > 0)
+    misfit = np.divide(total, witnesses, out=np.full(keyframe.count, EXPECTED), where=witnesses > 0)
+    return misfit, np.bincount(keyframe.owner, lost, keyframe.count) / np.maximum(witnesses, 1)

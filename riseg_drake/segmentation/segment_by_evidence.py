@@ -88,13 +88,20 @@ def segment_by_evidence(
     now = replace(now, view_error=renewed_view_error(now.view_error, pair))
     belief, bodies = now.belief, _bodies_before(now)
     assert belief is not None
-    candidates_K = candidate_motions(
+    compared = Comparison(
         belief.keyframe,
+        frame,
+        depth_noise=max(above_1.depth_noise, belief.keyframe.above.depth_noise),
+        view_error=now.view_error.share(parameters.observation.likelihood.view_error),
+    )
+    candidates_K = candidate_motions(
+        compared,
         pair.reference,
         groups,
         before.bodies.get(pair.reference.sequence, standing(belief)),
-        bodies.motions_K[1:],
+        bodies,
         bfif.motions.merge_flow,
+        parameters.search.alignment,
     )
     seen: Observation | None = None
     deciding = (
@@ -105,12 +112,6 @@ def segment_by_evidence(
             _share_in_view(belief, bodies, frame) > parameters.in_view
             or _leaves_keyframe(belief, bodies, frame, above_1, parameters)
         )
-    )
-    compared = Comparison(
-        belief.keyframe,
-        frame,
-        depth_noise=max(above_1.depth_noise, belief.keyframe.above.depth_noise),
-        view_error=now.view_error.share(parameters.observation.likelihood.view_error),
     )
     if len(candidates_K) and not deciding:
         seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters)

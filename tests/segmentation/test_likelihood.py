@@ -87,7 +87,30 @@ def test_a_camera_that_stands_shows_nothing_of_how_depth_errs(plate: tuple[Keyfr
 def test_nats_are_squared_residuals_by_what_is_usual_and_no_more_than_a_superpixel_may_say() -> None:
     # 24 pixels count as 4, half of each squared residual; what is usual is 2, up to 3 may be by chance.
     misfit, witnesses = np.array([[2.0, 2.0, 3.5], [2.5, 4.0, 2.0]]), np.array([24.0, 24.0, 24.0])
-    nats = Costs(misfit, witnesses).nats(LikelihoodParameters())
+    seen = np.zeros((2, 3))
+    nats = Costs(misfit, witnesses, seen).nats(LikelihoodParameters())
     np.testing.assert_allclose(nats, [[0, 0, 0.5 * 2], [0, 1.0 * 2, 0]])
-    twice = Costs(misfit, 100 * witnesses).nats(LikelihoodParameters())
+    twice = Costs(misfit, 100 * witnesses, seen).nats(LikelihoodParameters())
     np.testing.assert_allclose(twice, [[0, 0, 4], [0, 4, 0]])
+
+
+def test_what_a_motion_hides_is_no_match_but_worse_by_what_is_usual() -> None:
+    # The second motion hides half of it. What is usual is 2: half of that, for 24 pixels that count as 4.
+    misfit, witnesses = np.array([[2.5], [2.0]]), np.array([24.0])
+    nats = Costs(misfit, witnesses, np.array([[0.0], [0.5]])).nats(LikelihoodParameters())
+    np.testing.assert_allclose(nats, [[0], [0.5 * 2 * 24 / 6 / 2]])
+    without = Costs(misfit, witnesses, np.array([[0.0], [0.5]])).nats(LikelihoodParameters(hidden=0.0))
+    np.testing.assert_array_equal(without, [[0], [0]])
+
+
+def test_what_is_behind_the_robot_or_outside_the_image_is_hidden(plate: tuple[Keyframe, Frame]) -> None:
+    keyframe, frame = plate
+    behind = replace(frame, robot=np.ones_like(frame.robot))
+    aside = np.eye(4)
+    aside[0, 3] = 1.0
+    for seen, motion in ((behind, np.eye(4)), (frame, aside)):
+        compared = Comparison(keyframe, seen, DEPTH_NOISE, view_error=0.01)
+        hidden = motion_costs(compared, motion[None], LikelihoodParameters()).hidden[0]
+        np.testing.assert_array_equal(hidden, np.bincount(keyframe.owner, minlength=keyframe.count) > 0)
+    compared = Comparison(keyframe, frame, DEPTH_NOISE, view_error=0.01)
+    np.testing.assert_array_equal(motion_costs(compared, STILL, LikelihoodParameters()).hidden, 0)
