@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.segmentation.comparison import Comparison
+from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.lighting import gray_costs
 from riseg_drake.segmentation.noise import depth_sigma
 from riseg_drake.segmentation.surface import seek
@@ -44,8 +45,8 @@ class LikelihoodParameters:
     view_errors: float = 3.0
     """So many times that depth may err, and what stands still may seem to have moved, at most."""
     hidden: float = 1.0
-    """Times the mean squared residual that is usual, by which a witness is worse that cannot be compared: few
-    things go just where nobody can see them."""
+    """Times the mean squared residual that is usual, by which a hidden witness is worse than one that matches:
+    few things go just where nobody can see them."""
     superpixel_max: float = 4.0
     """Nats that one superpixel may say for a motion against another: its errors are its own."""
 
@@ -59,7 +60,8 @@ class Costs:
     witnesses: NDArray[np.float64]
     """[N], how many witnesses each superpixel has."""
     hidden: NDArray[np.float64]
-    """[G, N], share of them that cannot be compared: behind the robot, or outside the image."""
+    """[G, N], share of them that cannot be compared, as a motion takes them behind the robot or out of the
+    image; those that the camera's own motion takes out of it are not counted."""
 
     def with_motion(self, other: "Costs") -> "Costs":
         """These and other motions, for the same superpixels."""
@@ -91,13 +93,15 @@ def motion_costs(
     keyframe = compared.keyframe
     errs = parameters.view_errors * compared.view_error
     depth_factors = (1.0, 1 - errs, 1 + errs) if parameters.view_errors * compared.shift > _SEEN else (1.0,)
+    shape = compared.frame.intrinsics.shape
+    left = _share(~seek(keyframe.witnesses, compared.X_C1K).inside(shape), keyframe)
     misfit, hidden = np.empty((2, len(motions_K), keyframe.count))
     for k, motion in enumerate(motions_K):
         still = np.array_equal(motion, np.eye(4))
         light = parameters.light_still if still else parameters.light
         factors = depth_factors if still else (1.0,)
         tries = [_misfit(compared, motion, factor, light, parameters) for factor in factors]
-        misfit[k], hidden[k] = np.min([t[0] for t in tries], axis=0), tries[0][1]
+        misfit[k], hidden[k] = np.min([t[0] for t in tries], axis=0), np.maximum(tries[0][1] - left, 0)
     witnesses = np.bincount(keyframe.owner, minlength=keyframe.count).astype(float)
     return Costs(misfit, witnesses, hidden)
 
@@ -136,4 +140,10 @@ def _misfit(
     total = np.bincount(keyframe.owner, np.where(lost, EXPECTED, both), keyframe.count)
     witnesses = np.bincount(keyframe.owner, minlength=keyframe.count)
     misfit = np.divide(total, witnesses, out=np.full(keyframe.count, EXPECTED), where=witnesses > 0)
-    return misfit, np.bincount(keyframe.owner, lost, keyframe.count) / np.maximum(witnesses, 1)
+    return misfit, _share(lost, keyframe)
+
+
+def _share(which: NDArray[np.bool_], keyframe: Keyframe) -> NDArray[np.float64]:
+    """Of each superpixel's witnesses the share [N] that is among some of them [W]."""
+    witnesses = np.bincount(keyframe.owner, minlength=keyframe.count)
+    return np.bincount(keyframe.owner, which, keyframe.count) / np.maximum(witnesses, 1)

@@ -50,6 +50,11 @@ class Sought:
         """The places beside these, by some pixels."""
         return Sought(self.u + np.float32(du), self.v + np.float32(dv), self.depth)
 
+    def inside(self, shape: tuple[int, int]) -> NDArray[np.bool_]:
+        """Which of them [N] an image of some rows and columns shows."""
+        u, v = (x.ravel()[: len(self.depth)] for x in (self.u, self.v))
+        return (u >= 0) & (v >= 0) & (u <= shape[1] - 1) & (v <= shape[0] - 1)
+
     def read(self, image: NDArray, outside: float = 0) -> NDArray:
         """The values [N] of the nearest pixels of an image of C1; `outside` beyond its edges."""
         return self._read(image, cv2.INTER_NEAREST, outside)

@@ -114,3 +114,13 @@ def test_what_is_behind_the_robot_or_outside_the_image_is_hidden(plate: tuple[Ke
         np.testing.assert_array_equal(hidden, np.bincount(keyframe.owner, minlength=keyframe.count) > 0)
     compared = Comparison(keyframe, frame, DEPTH_NOISE, view_error=0.01)
     np.testing.assert_array_equal(motion_costs(compared, STILL, LikelihoodParameters()).hidden, 0)
+
+
+def test_what_leaves_the_image_by_the_cameras_own_motion_is_not_hidden(plate: tuple[Keyframe, Frame]) -> None:
+    keyframe, _ = plate
+    away = DrawnScene([(0.1, 0.1, 0.03)], textures=[Blank(120.0)]).frame(1, looking_down(1.0), [planar(0, 0)])
+    back = np.eye(4)
+    back[0, 3] = 1.0  # as the camera: it would be where it was in the image
+    compared = Comparison(keyframe, away[0], DEPTH_NOISE, view_error=0.01)
+    hidden = motion_costs(compared, np.array([np.eye(4), back]), LikelihoodParameters()).hidden
+    np.testing.assert_array_equal(hidden, 0)

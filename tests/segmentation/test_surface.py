@@ -46,6 +46,28 @@ def test_outside_the_other_view_and_behind_it_there_is_nothing_to_read() -> None
         assert np.isnan(sought.read_between(DEPTH)).all()
 
 
+def test_what_an_image_shows_is_what_can_be_read_between_its_pixels() -> None:
+    pixels = surface_pixels(MASK, DEPTH, CAMERA)
+    for x in (0.0, 0.1, 0.2, 10.0):
+        sought = seek(pixels, RigidTransform([x, 0.01, 0]).GetAsMatrix4())
+        readable = np.isfinite(sought.read_between(np.ones_like(DEPTH)))
+        # OpenCV reads between 32 steps a pixel.
+        u, v = (k.ravel()[: len(pixels)] for k in (sought.u, sought.v))
+        edges = np.array([u, v, u - (CAMERA.width - 1), v - (CAMERA.height - 1)])
+        clear = np.abs(edges).min(0) > 1 / 16
+        np.testing.assert_array_equal(sought.inside(CAMERA.shape)[clear], readable[clear])
+
+
+def test_a_point_of_twice_the_depth_appears_where_it_projects_to() -> None:
+    pixels = surface_pixels(MASK, DEPTH, CAMERA)
+    X = RigidTransform(RollPitchYaw(0.02, -0.03, 0.1), [0.01, 0.02, -0.03]).GetAsMatrix4()
+    far = seek(surface_pixels(MASK, 2 * DEPTH, CAMERA), X)
+    found = seek(pixels, X, depth_factor=2.0)
+    for one, other in ((found.u, far.u), (found.v, far.v)):
+        np.testing.assert_allclose(one.ravel()[: len(pixels)], other.ravel()[: len(pixels)], atol=1e-3)
+    np.testing.assert_allclose(found.depth, far.depth, rtol=1e-6)
+
+
 def test_beside_a_value_that_is_not_known_nothing_is_read_between_pixels() -> None:
     image = DEPTH.copy()
     image[20:30, 20:30] = np.nan
