@@ -13,11 +13,10 @@ from rich.console import Console
 
 from riseg_drake.app.evaluation_progress import EvaluationProgress
 from riseg_drake.app.given_masks import parse_given_masks, with_given_masks
-from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.output_folder import OutputFolder
 from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
 from riseg_drake.app.scene_folder import SceneTask, digest, is_finished, read_result
-from riseg_drake.app.scene_pool import Pool, cluster_pool, local_pool
+from riseg_drake.app.scene_pool import Pool, pool_for
 from riseg_drake.app.tables import score_table
 from riseg_drake.evaluation.disturbance import disturbance_of_all, disturbance_of_steps
 from riseg_drake.evaluation.figure import figure_png
@@ -75,9 +74,7 @@ def evaluate_command(
     )
     given = parse_given_masks(masks, taken=(OURS, *tasks[0].baselines))
     folder = tasks[0].folder.parent
-    pool = local_pool(jobs) if dask is None else cluster_pool(dask)
-    if dask is None:
-        require_graphics()
+    pool = pool_for(jobs, dask)
     last_step = scenario.arm.most_interactions
     results = evaluate(tasks, pool, last_step, console, given, overwrite)
     _print_scores(results, last_step, console)

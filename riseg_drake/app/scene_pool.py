@@ -14,6 +14,7 @@ from joblib import Parallel, cpu_count, delayed, parallel_config
 from joblib.externals.loky.backend import resource_tracker as loky_resource_tracker
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
+from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.output import RECORDING
 from riseg_drake.app.scene_folder import SceneTask, note_death
 from riseg_drake.app.scene_work import SceneOutcome, work_on
@@ -32,6 +33,18 @@ class Pool(Protocol):
 
     def __call__(self, tasks: Sequence[SceneTask]) -> Iterator[SceneOutcome]:
         """Work on all of them."""
+
+
+def pool_for(jobs: int, dask: str | None) -> Pool:
+    """Processes of this machine, which must be able to draw, or the Dask cluster at an address.
+
+    Raises NoGraphicsError, PoolError.
+    """
+    if dask is not None:
+        return cluster_pool(dask)
+    pool = local_pool(jobs)
+    require_graphics()
+    return pool
 
 
 def local_pool(jobs: int, work: Work = work_on) -> Pool:

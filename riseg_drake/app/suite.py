@@ -20,12 +20,11 @@ from rich.console import Console
 
 from riseg_drake.app.evaluate import REPORT, EvaluationError, interruption_told, scene_tasks
 from riseg_drake.app.evaluation_progress import EvaluationProgress
-from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.output_folder import OutputFolder
 from riseg_drake.app.scenario import Scenario, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.scene_folder import SceneTask, digest, is_finished, read_result
-from riseg_drake.app.scene_pool import Pool, cluster_pool, local_pool
+from riseg_drake.app.scene_pool import Pool, pool_for
 from riseg_drake.app.scene_work import SceneOutcome
 from riseg_drake.app.tables import score_table
 from riseg_drake.evaluation.figure import figure_png
@@ -67,9 +66,7 @@ def suite_command(
     kinds = find_suite(suite)
     folder = output or Path("out") / f"suite_{Path(suite).name}_seed_{seed}"
     tasks = {kind: kind_tasks(kind, folder, scenes or SCENES, seed) for kind in kinds}
-    pool = local_pool(jobs) if dask is None else cluster_pool(dask)
-    if dask is None:
-        require_graphics()
+    pool = pool_for(jobs, dask)
     results = evaluate_suite(tasks, folder, pool, console, overwrite)
     rows = [(each.name, step_means([s.scores for s in each.scenes], each.last_step)[-1]) for each in results]
     console.print("\nafter the last interaction, means over the scenes of each kind, in percent")

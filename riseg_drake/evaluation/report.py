@@ -20,6 +20,14 @@ from riseg_drake.evaluation.step_means import carried, step_means
 
 FIGURE_FILE = "figure.png"
 
+DISTURBANCE_HEAD = (
+    "interactions",
+    "pushed object moved, mean cm",
+    "others moved, median mm",
+    "most tilt, degrees",
+    "toppled",
+    "left the table",
+)
 _HEAD = ("Overlap P", "R", "F", "Boundary P", "R", "F", "found %")
 
 
@@ -138,21 +146,12 @@ def _ending_section(scenes: Sequence[SceneResult]) -> str:
 def _disturbance_section(scenes: Sequence[SceneResult], last_step: int) -> str:
     disturbances = [scene.disturbances for scene in scenes]
     rows = [
-        _disturbance_row(str(i), figures)
+        [str(i), *disturbance_cells(figures)]
         for i, figures in enumerate(disturbance_of_steps(disturbances, last_step), start=1)
     ]
-    rows.append(_disturbance_row("**all**", disturbance_of_all(disturbances)))
-    head = (
-        "interaction",
-        "scenes",
-        "pushed object moved, mean cm",
-        "others moved, median mm",
-        "most tilt, degrees",
-        "toppled",
-        "left the table",
-    )
+    rows.append(["**all**", *disturbance_cells(disturbance_of_all(disturbances))])
     return (
-        markdown_table(head, rows)
+        markdown_table(("after", *DISTURBANCE_HEAD), rows)
         + f"""
 The pushed object is the one that the push was planned to meet. Tilt is against the start of the run; more
 than {TOPPLED_DEG:g} degrees count as toppled, also where a ball has merely rolled.
@@ -160,9 +159,9 @@ than {TOPPLED_DEG:g} degrees count as toppled, also where a ball has merely roll
     )
 
 
-def _disturbance_row(name: str, figures: DisturbanceFigures) -> list[str]:
+def disturbance_cells(figures: DisturbanceFigures) -> list[str]:
+    """A row of a table below `DISTURBANCE_HEAD`."""
     return [
-        name,
         str(figures.interactions),
         _number(100 * figures.pushed_mean_m, 2),
         _number(1000 * figures.others_median_m, 2),

@@ -1,14 +1,15 @@
 """The report of a suite, in Markdown: a row a kind, beside what one picture alone gives."""
 
-import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from riseg_drake.evaluation.report import markdown_table, percent
+from riseg_drake.evaluation.disturbance import DisturbanceFigures, disturbance_of_all
+from riseg_drake.evaluation.in_motion import MOVED, InMotion, mean_over_scenes
+from riseg_drake.evaluation.report import DISTURBANCE_HEAD, disturbance_cells, markdown_table, percent
 from riseg_drake.evaluation.scene_result import SceneResult
 from riseg_drake.evaluation.scores import Scores
 from riseg_drake.evaluation.step_means import step_means
@@ -36,9 +37,19 @@ class KindResult:
         return float(np.mean([scene.interactions for scene in self.scenes]))
 
     @property
+    def in_motion(self) -> InMotion | None:
+        """Of the things that were moved, the mean over the scenes; None where nothing moved in sight."""
+        return mean_over_scenes([scene.in_motion for scene in self.scenes])[1]
+
+    @property
+    def disturbance(self) -> DisturbanceFigures:
+        """By how much things were moved."""
+        return disturbance_of_all([scene.disturbances for scene in self.scenes])
+
+    @property
     def endings(self) -> dict[str, int]:
         """How many scenes ended for each reason, the most frequent first."""
-        reasons = [f"failed: {s.failure}" if s.failure else s.ended or _reason(s.end) for s in self.scenes]
+        reasons = [f"failed: {s.failure}" if s.failure else s.ended or "otherwise" for s in self.scenes]
         return dict(Counter(reasons).most_common())
 
 
@@ -70,6 +81,10 @@ def suite_text(kinds: Sequence[KindResult], about: Mapping[str, object]) -> str:
             markdown_table(head, rows),
             "In percent, after the last interaction, means over the scenes of a kind. The baselines move\n"
             "nothing: their Overlap F on the picture before the first interaction, and after the last.\n",
+            "## In motion, and what was moved\n",
+            _moved(kinds),
+            f"Overlap F, in percent, of what has moved by {100 * MOVED:g} cm or more, in every frame from\n"
+            "then on until the camera observes again, and of the same at rest after it.\n",
             "## The scenes\n",
             _scenes(kinds),
         ]
@@ -88,10 +103,21 @@ def suite_figures(kinds: Sequence[KindResult]) -> dict[str, Any]:
                 name: {"untouched": kind.mean(name, 0).as_dict(), "last": kind.mean(name, -1).as_dict()}
                 for name in dict.fromkeys(name for scene in kind.scenes for name in scene.baselines)
             },
+            "in_motion": None if kind.in_motion is None else asdict(kind.in_motion),
+            "disturbance": asdict(kind.disturbance),
             "endings": kind.endings,
         }
         for kind in kinds
     }
+
+
+def _moved(kinds: Sequence[KindResult]) -> str:
+    rows = []
+    for kind in kinds:
+        moved, disturbed = kind.in_motion, kind.disturbance
+        in_motion = ["–", "–"] if moved is None else [percent(moved.overlap_f), percent(moved.at_rest_f)]
+        rows.append([kind.name, *in_motion, *disturbance_cells(disturbed)])
+    return markdown_table(("kind", "in motion", "at rest after it", *DISTURBANCE_HEAD), rows)
 
 
 def _scenes(kinds: Sequence[KindResult]) -> str:
@@ -108,8 +134,3 @@ def _scenes(kinds: Sequence[KindResult]) -> str:
                 [picture, str(scene.seed), str(scene.interactions), *figures, scene.failure or scene.end]
             )
     return markdown_table(("kind", "seed", "interactions", "Overlap F", "Boundary F", "found", "end"), rows)
-
-
-def _reason(end: str) -> str:
-    """Why a run ended, without the figures by which alike endings differ."""
-    return re.sub(r"^(\d+) of \1 interactions were made", "interactions used up", end)

@@ -13,6 +13,7 @@ from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.scene_pool import local_pool
 from riseg_drake.app.suite import evaluate_suite, find_suite, kind_tasks
 from riseg_drake.evaluation.baselines import BASELINES
+from riseg_drake.evaluation.in_motion import InMotion
 from riseg_drake.evaluation.scores import score
 from riseg_drake.stations.object_models import find_models, resolve
 
@@ -32,8 +33,10 @@ def runs(monkeypatch):
         for i in range(2):
             mask = SQUARE if i else np.zeros_like(SQUARE)
             scores = score(mask, SQUARE)
-            folder.write_step(Step(i, 0.1 * i, color, depth, mask, 1, ground_truth=SQUARE, scores=scores))
-        folder.note(state="done", end="1 of 1 interactions were made" if seed else "no push is left")
+            moved = InMotion(10, 0.7 if seed else 0.5, 1.0) if i else None
+            step = Step(i, 0.1 * i, color, depth, mask, 1, ground_truth=SQUARE, scores=scores, in_motion=moved)
+            folder.write_step(step)
+        folder.note(state="done", ended="enough_interactions" if seed else "nothing_left")
 
     def score_baselines(scenario, folder, steps):
         half = SQUARE.copy()
@@ -73,10 +76,13 @@ def test_the_table_has_a_row_a_kind_beside_the_baselines_on_first_and_last_pictu
     cells = [cell.strip() for cell in row.strip("|").split("|")]
     assert cells[1:6] == ["2", "1.0 of 1", "100.0", "100.0", "100.0"]
     assert cells[6:10] == [f"{half:.1f}", "100.0"] * 2
-    assert set(cells[10].split("; ")) == {"1 no push is left", "1 interactions used up"}
+    assert set(cells[10].split("; ")) == {"1 nothing_left", "1 enough_interactions"}
+    moved = next(line for line in (output / "report.md").read_text().splitlines() if "| late " in line)
+    assert [cell.strip() for cell in moved.split("|")[2:4]] == ["60.0", "100.0"], "means over the scenes"
     content = json.loads((output / "summary.json").read_text())
     assert content["state"] == "done"
     assert list(content["kinds"]) == ["1_early_bird", "2_late"]
+    assert content["kinds"]["2_late"]["in_motion"]["overlap_f"] == pytest.approx(0.6)
     assert (output / "2_late" / "report.md").exists(), "each kind has its whole report, too"
 
 
