@@ -32,7 +32,7 @@ def command_line() -> argparse.ArgumentParser:
         "Writes pictures, masks and scores of every interaction to the output folder.",
     )
     _add_scenario(run)
-    run.add_argument("--seed", type=int, default=0, metavar="N", help="draws the scene and the noise (0)")
+    run.add_argument("--seed", type=_seed, default=0, metavar="N", help="draws the scene and the noise (0)")
     run.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/SCENARIO_seed_N)")
     _add_overwrite(run, "run")
     run.add_argument("--record", action="store_true", help="also write every frame to DIR/recording")
@@ -61,7 +61,7 @@ def command_line() -> argparse.ArgumentParser:
     )
     evaluate.add_argument(
         "--seed",
-        type=int,
+        type=_seed,
         default=100,
         metavar="S",
         help="of the first scene, the others follow (100; the program was developed on 0 to 19)",
@@ -104,7 +104,7 @@ def command_line() -> argparse.ArgumentParser:
     hardware.add_argument(
         "scenario", type=Path, nargs="?", metavar="SCENARIO", help="a YAML file (the built-in hardware.yaml)"
     )
-    hardware.add_argument("--seed", type=int, default=0, metavar="N", help="draws samples (0)")
+    hardware.add_argument("--seed", type=_seed, default=0, metavar="N", help="draws samples (0)")
     hardware.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/SCENARIO_TIME)")
     hardware.add_argument("--record", action="store_true", help="also write every frame to DIR/recording")
     hardware.add_argument(
@@ -145,7 +145,7 @@ def command_line() -> argparse.ArgumentParser:
         "Runs at wall-clock time until Ctrl-C, and misbehaves when it is told to.",
     )
     _add_scenario(emulate)
-    emulate.add_argument("--seed", type=int, default=0, metavar="N", help="draws scene, noise and faults (0)")
+    emulate.add_argument("--seed", type=_seed, default=0, metavar="N", help="draws scene, noise and faults (0)")
     emulate.add_argument(
         "--control-mode",
         choices=("status_only", "velocity", "position"),
@@ -229,7 +229,7 @@ def command_line() -> argparse.ArgumentParser:
         "The pairs are a rendered push, held in memory; nothing is written.",
     )
     _add_scenario(bench)
-    bench.add_argument("--seed", type=int, default=0, metavar="N", help="draws the scene and the noise (0)")
+    bench.add_argument("--seed", type=_seed, default=0, metavar="N", help="draws the scene and the noise (0)")
     bench.add_argument(
         "--stream",
         type=_positive,
@@ -262,7 +262,9 @@ def command_line() -> argparse.ArgumentParser:
         "With --evaluation also the figure of an evaluation.",
     )
     _add_scenario(pictures)
-    pictures.add_argument("--seed", type=int, default=4, metavar="N", help="draws the scene and the noise (4)")
+    pictures.add_argument(
+        "--seed", type=_seed, default=4, metavar="N", help="draws the scene and the noise (4)"
+    )
     pictures.add_argument(
         "--output", type=Path, default=Path("out/pictures"), metavar="DIR", help="folder (out/pictures)"
     )
@@ -295,8 +297,8 @@ def _positive(text: str) -> int:
 
 
 def _seed(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 up")
+    if not text.isdecimal() or len(text) > 9:
+        raise argparse.ArgumentTypeError(f"{text[:20]!r} is not a whole number from 0 to 999999999")
     return int(text)
 
 

@@ -23,7 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.filterwarnings("ignore", message=".*joblib will operate in serial mode", category=UserWarning)
     with stopped_by_signals(commands.__file__) as stop:
         try:
-            chosen.call(chosen, Console())
+            chosen.call(chosen, Console(markup=False))  # what is said may hold anybody's brackets
         except KeyboardInterrupt as interrupt:
             return _stopped(stop, f"stopped; {interrupt}" if str(interrupt) else "stopped")
         except BrokenPipeError:
@@ -66,6 +66,7 @@ def _refused(error: Exception) -> int:
 def _mistakes() -> tuple[type[Exception], ...]:
     """The errors that tell a person what to do otherwise; any other is a fault of this program."""
     from riseg_drake.app.arm_travel import TravelError
+    from riseg_drake.app.emulate import CameraDiedError
     from riseg_drake.app.evaluate import EvaluationError
     from riseg_drake.app.graphics import NoGraphicsError
     from riseg_drake.app.hardware import HardwareError
@@ -88,6 +89,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
         OSError,
         NoGraphicsError,
         OutputError,
+        CameraDiedError,
         ScenarioError,
         SceneError,
         LabelFolderError,

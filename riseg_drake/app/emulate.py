@@ -16,6 +16,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
 from time import sleep, time
+from typing import Any
 
 from rich.console import Console
 
@@ -34,6 +35,7 @@ from riseg_drake.stations.motion_judge import MotionVerdict
 from riseg_drake.stations.promptness import be_prompt
 from riseg_drake.stations.simulated import SimulatedStationConfig
 
+_DIED = "the process that draws the camera's pictures has died; it was out of memory, or the renderer broke"
 _GIVE_WAY = 2  # niceness of the camera's process: the status comes first, but pictures must not starve
 _PRIORITY = 10  # of the arm's process among real-time ones, where the system allows that
 _LONGEST_WAIT = 0.05  # s, until the camera's process listens for words again
@@ -68,11 +70,11 @@ def emulate_command(
         config.driver.control_mode = control_mode
     warning = receive_buffer_warning(config.lcm.url)
     if warning:
-        console.print(f"[yellow]{warning}")
+        console.print(warning, style="yellow")
     with _camera_process(scenario_file, seed, faults) as camera:
         with console.status("placing the objects"):
             arm = _place(station, config, seed)
-            complaint = camera.recv()
+            complaint = _told_by(camera)
         if complaint:
             raise ScenarioError(complaint)
         console.print(
@@ -88,11 +90,15 @@ def emulate_command(
             write_verdict(judge, verdict)
 
 
+class CameraDiedError(RuntimeError):
+    """The emulator has no camera any more; in one line."""
+
+
 def write_verdict(file: Path, verdict: MotionVerdict) -> None:
     """How calm the arm's motion was, as JSON. Raises OutputError."""
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        write_text(file, to_json(asdict(verdict)))
+        write_text(Path(os.path.realpath(file)), to_json(asdict(verdict)))
     except OSError as error:
         raise OutputError(f"cannot write {file}: {error.strerror}") from None
 
@@ -115,12 +121,11 @@ def _run(side: PandaSide, config: EmulatorConfig, camera: Connection, console: C
     start = time()
     try:
         _keep_time(side, camera, 1 / config.rate, console)
-    except (BrokenPipeError, ConnectionResetError) as error:
-        raise RuntimeError("the camera's process has died") from error
+    except (BrokenPipeError, ConnectionResetError):
+        raise CameraDiedError(_DIED) from None
     except KeyboardInterrupt:
         elapsed = time() - start
-        camera.send(None)
-        pictures = camera.recv()
+        pictures = _last_said_by(camera)
         console.print(
             f"ended after {elapsed:.0f} s: status at {side.published / elapsed:.0f} Hz, "
             f"pictures at {pictures / elapsed:.1f} Hz"
@@ -140,6 +145,23 @@ def _keep_time(side: PandaSide, camera: Connection, period: float, console: Cons
             next_picture = max(next_picture + int(1e6 * period), arm.state_us + int(0.5e6 * period))
             camera.send(Moment(arm.state_us, arm.positions(), not arm.driver.robot.is_moving))
         sleep(max(0.0, 1e-6 * (arm.wall_us + TICK_US - _wall_us())))
+
+
+def _told_by(camera: Connection) -> Any:
+    """What the camera's process says next. Raises CameraDiedError."""
+    try:
+        return camera.recv()
+    except (EOFError, ConnectionResetError):
+        raise CameraDiedError(_DIED) from None
+
+
+def _last_said_by(camera: Connection) -> int:
+    """How many pictures it has made, at the end. Raises CameraDiedError."""
+    try:
+        camera.send(None)
+    except (BrokenPipeError, ConnectionResetError):
+        raise CameraDiedError(_DIED) from None
+    return int(_told_by(camera))
 
 
 @contextmanager

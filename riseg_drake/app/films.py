@@ -157,8 +157,9 @@ def _told(items: Iterable[Any], total: int, what: str, console: Console) -> Iter
 
 
 def _finished(work: Path) -> dict[str, Any]:
-    """The scores of a film that was segmented before; empty where it was not."""
-    return read_json(work / FILM_FILE)
+    """The scores of a film that was segmented before; empty where it was not, and where one is missing."""
+    known = read_json(work / FILM_FILE)
+    return known if set(FilmScores().as_dict()) <= set(known) else {}
 
 
 def _together(films: Sequence[dict[str, Any]]) -> dict[str, Any]:

@@ -77,7 +77,7 @@ def hardware_command(
     check_limits(scenario)
     warning = receive_buffer_warning(config.lcm.url)
     if warning:
-        console.print(f"[yellow]{warning}")
+        console.print(warning, style="yellow")
     name = scenario_name(scenario_file, HARDWARE)
     dry_run = dry_run or replayed
     folder = RunFolder(

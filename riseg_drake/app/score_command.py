@@ -1,5 +1,6 @@
 """`riseg score`: two folders of label images, ten figures."""
 
+import os
 from pathlib import Path
 
 from rich.console import Console
@@ -27,7 +28,7 @@ def score_command(predicted: Path, true: Path, json_file: Path | None, console: 
             "images": {name: scores.as_dict() for name, scores in images.items()},
         }
         try:
-            write_text(json_file, to_json(content))
+            write_text(Path(os.path.realpath(json_file)), to_json(content))
         except OSError as error:
             raise OutputError(f"cannot write {json_file}: {error.strerror}") from None
     rows = [*images.items(), ("mean", mean)] if len(images) <= MOST_ROWS else [("mean", mean)]

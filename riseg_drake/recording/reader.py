@@ -90,8 +90,10 @@ class RecordingReader:
     def holds_images(self, folder: str) -> bool:
         """Whether `robot` or `label` is there and holds something."""
         path = self.folder / folder
-        if not path.is_dir():
+        if not os.path.lexists(path):
             return False
+        if not path.is_dir():
+            raise RecordingError(f"{path} is no folder of images; make it one or take it away")
         self._check_leads_nowhere(path)
         return any(path.iterdir())
 

@@ -1,5 +1,6 @@
 """The lists of a recording: lines that begin with a time stamp, and what belongs to a moment between them."""
 
+import os
 from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -88,7 +89,7 @@ def read_table(
     `columns` counts the stamp, None takes any number that is the same in all rows; the file must lie in the
     folder `inside`, where one is given. Raises RecordingError.
     """
-    if not path.exists():
+    if not os.path.lexists(path):
         return None
     text = _text(path, inside)
     numbers, lines, names = array("d"), array("q"), _heading(text, separator)

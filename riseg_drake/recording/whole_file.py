@@ -4,17 +4,22 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 import cv2
 from numpy.typing import NDArray
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write beside the target, then rename over it. An OSError names the target."""
+    """Write beside the target, then rename over it; into a device or a pipe as it is. An OSError names it."""
     unfinished = path.with_name(f".{path.name}.unfinished")
     with _naming(path):
+        if path.exists() and not path.is_file():
+            path.write_bytes(content)
+            return
         try:
-            unfinished.write_bytes(content)
+            with _new_file(unfinished) as file:
+                file.write(content)
             os.replace(unfinished, path)
         finally:
             unfinished.unlink(missing_ok=True)
@@ -40,7 +45,7 @@ class GrowingText:
     def __init__(self, path: Path):
         self._path = path
         with _naming(path):
-            self._file = path.open("wb", buffering=0)
+            self._file = _new_file(path)
 
     def append(self, line: str) -> None:
         """Write one line, given without its end; where the disk is full none of it stays."""
@@ -57,6 +62,12 @@ class GrowingText:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
+
+
+def _new_file(path: Path) -> BinaryIO:
+    """A new file in the place of what lies there: nothing is written through a link or into a pipe."""
+    path.unlink(missing_ok=True)
+    return open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666), "wb", buffering=0)
 
 
 @contextmanager

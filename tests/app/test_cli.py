@@ -28,3 +28,12 @@ def test_any_other_broken_pipe_is_not_taken_for_success(monkeypatch):
     monkeypatch.setattr(cli, "nobody_reads", lambda: False)
     with pytest.raises(BrokenPipeError):
         cli.main(["diagram"])
+
+
+@pytest.mark.parametrize("command", ["run", "evaluate", "hardware", "emulate", "bench", "pictures"])
+@pytest.mark.parametrize("seed", ["-1", "1e3", "1.5", "9" * 30])
+def test_a_seed_that_is_none_is_said_by_the_name_of_its_option(command, seed, capsys):
+    with pytest.raises(SystemExit):
+        cli.main([command, f"--seed={seed}"])
+    assert "--seed: " in (error := capsys.readouterr().err)
+    assert "is not a whole number from 0 to 999999999" in error

@@ -6,13 +6,16 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from dataclasses import fields
+from multiprocessing import Pipe
 
 import numpy as np
 import pytest
 from drake import lcmt_image_array, lcmt_panda_command, lcmt_panda_status
 from pydrake.lcm import DrakeLcm
 
+from riseg_drake.app import emulate
 from riseg_drake.app.cli import main
 from riseg_drake.stations.ground_truth import LABEL_CHANNEL, decode_labels
 from riseg_drake.stations.lcm_images import decode_images
@@ -197,3 +200,19 @@ def test_a_word_is_said_on_the_control_channel(tmp_path):
     assert main(["emulate", str(scenario), "--say", "images drop 0.1"]) == 0
     lcm.HandleSubscriptions(1000)
     assert heard == [b"images drop 0.1"]
+
+
+def test_a_camera_that_has_died_is_one_line(monkeypatch, capsys):
+    here, there = Pipe()
+    there.close()
+
+    @contextmanager
+    def dead(*_):
+        yield here
+
+    monkeypatch.setattr(emulate, "_camera_process", dead)
+    monkeypatch.setattr(emulate, "_place", lambda *_: None)
+    assert main(["emulate"]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("riseg: the process that draws the camera's pictures has died")
+    assert error.count("\n") == 1

@@ -63,3 +63,9 @@ def test_another_folder_and_one_without_recordings_are_refused_in_one_line(folde
     assert "holds something else" in capsys.readouterr().err
     assert main(["evaluate", "--suite", "films", "--recordings", str(tmp_path), "--output", "x"]) == 2
     assert "holds no recording" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("content", ["{}", '{"a": 1}', '{"frames": 3}', "[1]", "no JSON"])
+def test_a_film_whose_scores_lack_something_is_done_anew(tmp_path, content) -> None:
+    (tmp_path / films.FILM_FILE).write_text(content)
+    assert films._finished(tmp_path) == {}

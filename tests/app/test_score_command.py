@@ -62,3 +62,25 @@ def test_every_command_is_explained_in_two_lines(capsys):
         assert stop.value.code == 0
         explanation = capsys.readouterr().out.split("\n\n")[1]
         assert len(explanation.splitlines()) == 2
+
+
+def test_names_with_brackets_are_said_as_they_are(folders, capsys):
+    for folder in ("predicted", "true"):
+        name = next((folders / folder).rglob("*.png"))
+        name.rename(name.with_name("[red]x[[b].png"))
+    assert main(["score", str(folders / "predicted"), str(folders / "true")]) == 0
+    assert "[red]x[[b].png" in capsys.readouterr().out
+
+
+def test_json_goes_where_a_link_leads(folders):
+    (folders / "link.json").symlink_to(folders / "real.json")
+    arguments = [
+        "score",
+        str(folders / "predicted"),
+        str(folders / "true"),
+        "--json",
+        str(folders / "link.json"),
+    ]
+    assert main(arguments) == 0
+    assert (folders / "link.json").is_symlink()
+    assert "scores" in json.loads((folders / "real.json").read_text())

@@ -78,3 +78,33 @@ def test_a_right_model_passes(tmp_path):
     check_model(tmp_path / "box.urdf")
     with pytest.raises(ModelFileError):
         check_model(tmp_path / "nowhere.urdf")
+
+
+_SHAPE = "<{0}><link name='a'><visual name='v'><geometry>{1}</geometry></visual></link></{0}>"
+MESH = {
+    "box.urdf": _SHAPE.format("robot", "<mesh filename='{}'/>"),
+    "box.sdf": _SHAPE.format("model", "<mesh><uri>{}</uri></mesh>"),
+    "box.xml": "<mujoco><asset><mesh name='a' file='{}'/></asset></mujoco>",
+}
+
+
+@pytest.mark.parametrize("name", MESH)
+@pytest.mark.parametrize("scheme", ["", "file://"])
+@pytest.mark.parametrize("kind", ["pipe", "device"])
+def test_a_mesh_that_is_no_file_is_one_line_and_hangs_nobody(tmp_path, name, scheme, kind):
+    if kind == "pipe":
+        os.mkfifo(tmp_path / "mesh.obj")
+    else:
+        (tmp_path / "mesh.obj").symlink_to("/dev/zero")
+    uri = f"{scheme}{tmp_path / 'mesh.obj'}" if scheme else "mesh.obj"
+    (tmp_path / name).write_text(MESH[name].format(uri))
+    with pytest.raises(ModelFileError, match=r"its mesh .*mesh\.obj is not a file"):
+        check_model(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", MESH)
+@pytest.mark.parametrize("uri", ["mesh.obj", "nowhere.obj", "package://other/mesh.obj"])
+def test_meshes_that_are_files_or_drakes_to_find_pass(tmp_path, name, uri):
+    (tmp_path / "mesh.obj").write_text("v 0 0 0")
+    (tmp_path / name).write_text(MESH[name].format(uri))
+    check_model(tmp_path / name)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import struct
 import zlib
 
@@ -228,3 +229,22 @@ def test_a_recording_behind_a_link_is_a_recording(recording):
     link = recording.parent / "link"
     link.symlink_to(recording)
     assert len(list(RecordingReader(link))) == 6
+
+
+@pytest.mark.parametrize("name", ["groundtruth.txt", "joints.csv"])
+def test_a_list_that_is_a_link_to_nothing_is_missing(recording, name):
+    (recording / name).unlink(missing_ok=True)
+    (recording / name).symlink_to("gone")
+    with pytest.raises(RecordingError, match=f"{name} is missing"):
+        RecordingReader(recording)
+
+
+@pytest.mark.parametrize("kind", ["file", "link"])
+def test_robot_masks_that_are_no_folder_are_not_passed_over(recording, kind):
+    shutil.rmtree(recording / "robot", ignore_errors=True)
+    if kind == "file":
+        (recording / "robot").write_text("")
+    else:
+        (recording / "robot").symlink_to("gone")
+    with pytest.raises(RecordingError, match=r"robot is no folder of images; make it one or take it away"):
+        RecordingReader(recording).holds_images("robot")
