@@ -25,6 +25,8 @@ from riseg_drake.host.terminal import one_line
 Schema = TypeVar("Schema")
 
 
+MOST_VALUES = 20_000
+"""Keys and values; ten times as many take YAML's reader ten seconds."""
 DEEPEST = 32
 """Blocks and lists in each other."""
 
@@ -115,8 +117,9 @@ def _check_plain(text: str, source: str) -> None:
 
     Brackets in brackets cost time by their square, and memory of the stack; directives change what tags mean.
     """
-    depth = 0
+    depth = values = 0
     for event in yaml.parse(text, Loader=yaml.SafeLoader):
+        values += isinstance(event, yaml.NodeEvent)
         line = event.start_mark.line + 1
         if isinstance(event, yaml.DocumentStartEvent) and (event.version or event.tags):
             raise ScenarioError(f"{source}: line {line}: a scenario has no directives (%YAML, %TAG)")
@@ -124,6 +127,10 @@ def _check_plain(text: str, source: str) -> None:
             depth += 1
         elif isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
+        if values > MOST_VALUES:
+            raise ScenarioError(
+                f"{source}: line {line}: a scenario has no more than {MOST_VALUES} keys and values"
+            )
         if depth > DEEPEST:
             raise ScenarioError(f"{source}: line {line}: nothing in a scenario is nested so deeply")
 

@@ -20,6 +20,8 @@ _ANOTHER_VIEW = 100.0
 """Pixels of the camera's motion from which smooth errors of depth are others."""
 _PAIRS = 30.0
 """Over about so many pairs is the view's error measured."""
+_LOST = 0.1
+"""Share of the camera's motion from which a residual says that flow was lost."""
 _SPAN_ASSUMED = 20.0
 """Pixels of the camera's motion in a pair that would say what is assumed before any has said something."""
 
@@ -40,14 +42,15 @@ class ViewError(Immutable):
 
 
 def renewed_view_error(known: ViewError, pair: FramePair) -> ViewError:
-    """The view's error in the light of one more pair; those whose poses are taken as they are say nothing."""
-    if pair.residual == 0:
+    """The view's error in the light of one more pair.
+
+    Those whose poses are taken as they are say nothing, nor do those whose flow was lost.
+    """
+    span = camera_span(pair.reference, pair.current)
+    if pair.residual == 0 or pair.residual > _LOST * span:
         return known
     kept = 1 - 1 / _PAIRS
-    return ViewError(
-        kept * known.residual_squares + pair.residual**2,
-        kept * known.span_squares + camera_span(pair.reference, pair.current) ** 2,
-    )
+    return ViewError(kept * known.residual_squares + pair.residual**2, kept * known.span_squares + span**2)
 
 
 @dataclass(frozen=True)

@@ -166,6 +166,7 @@ def test_a_kind_is_checked_as_what_it_is(text, message):
     ("text", "says"),
     [
         ("[" * 100_000, "line 1: nothing in a scenario is nested so deeply"),
+        ("a: [" + "1, " * 100_000, "line 1: a scenario has no more than 20000 keys and values"),
         ("{a: " * 100_000, "line 1: nothing in a scenario is nested so deeply"),
         ("%YAML 1.1\n---\nlongest: 3", "no directives"),
         ("%TAG !! tag:x,2000:\n---\nlongest: 3", "no directives"),

@@ -67,6 +67,13 @@ def test_a_pair_whose_poses_are_exact_says_nothing() -> None:
     assert renewed_view_error(known, FramePair(over(0.0), over(0.05))) is known
 
 
+def test_a_pair_whose_flow_was_lost_says_nothing() -> None:
+    span = CAMERA.fx * 0.05 / DEPTH
+    for share, says in ((0.095, True), (0.105, False)):
+        pair = FramePair(over(0.0), over(0.05), residual=share * span)
+        assert (renewed_view_error(ViewError(), pair) != ViewError()) is says
+
+
 def test_it_takes_points_of_the_keyframe_to_the_frames_camera(keyframe: Keyframe) -> None:
     compared = Comparison(keyframe, replace(over(0.05), sequence=7), 0.0023, 0.01)
     np.testing.assert_allclose(compared.X_C1K[:3, 3], [-0.05, 0, 0], atol=1e-9)
