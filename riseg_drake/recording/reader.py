@@ -88,7 +88,7 @@ class RecordingReader:
         return float(1 / np.median(np.diff(times))) if len(times) > 1 else 1.0
 
     def holds_images(self, folder: str) -> bool:
-        """Whether `robot` or `label` is there and holds something."""
+        """Whether `robot` or `label` is there and holds something. Raises RecordingError if it is no folder."""
         path = self.folder / folder
         if not os.path.lexists(path):
             return False

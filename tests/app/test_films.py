@@ -65,6 +65,16 @@ def test_another_folder_and_one_without_recordings_are_refused_in_one_line(folde
     assert "holds no recording" in capsys.readouterr().err
 
 
+def test_a_recording_that_is_named_as_a_film_is_refused(tmp_path, capsys) -> None:
+    (tmp_path / "film_003").mkdir()
+    (tmp_path / "film_003" / "camera.json").write_text("{}")
+    output = tmp_path / "out"
+    arguments = ["--recordings", str(tmp_path), "--output", str(output)]
+    assert main(["evaluate", "--suite", "films", "--seed", "2", *arguments]) == 2
+    assert "a recording is named film_003, as a film that is made here" in capsys.readouterr().err
+    assert not output.exists()
+
+
 @pytest.mark.parametrize("content", ["{}", '{"a": 1}', '{"frames": 3}', "[1]", "no JSON"])
 def test_a_film_whose_scores_lack_something_is_done_anew(tmp_path, content) -> None:
     (tmp_path / films.FILM_FILE).write_text(content)
