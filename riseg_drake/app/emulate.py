@@ -140,9 +140,10 @@ def _keep_time(side: PandaSide, camera: Connection, period: float, console: Cons
         side.advance(_wall_us())
         for note in side.notes():
             console.print(note)
-        if arm.state_us >= next_picture:
+        if arm.state_us >= next_picture or arm.state_us < next_picture - int(1e6 * period):  # the clock was set
             # Late pictures do not bring the next one nearer.
-            next_picture = max(next_picture + int(1e6 * period), arm.state_us + int(0.5e6 * period))
+            in_time = min(next_picture, arm.state_us) + int(1e6 * period)
+            next_picture = max(in_time, arm.state_us + int(0.5e6 * period))
             camera.send(Moment(arm.state_us, arm.positions(), not arm.driver.robot.is_moving))
         sleep(max(0.0, 1e-6 * (arm.wall_us + TICK_US - _wall_us())))
 

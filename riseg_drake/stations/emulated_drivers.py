@@ -110,7 +110,7 @@ class PandaSide:
         """Let the world come up to a wall time, microseconds, and publish the status of its last tick."""
         now = 1e-6 * wall_us
         behind = wall_us - self.arm.wall_us
-        if behind > _LONGEST_CATCHING_UP:
+        if abs(behind) > _LONGEST_CATCHING_UP:  # or the clock was set
             self.arm.skip(behind - TICK_US)
         if not self._link.is_stalled(now):
             self._lcm.HandleSubscriptions(0)

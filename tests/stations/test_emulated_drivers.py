@@ -137,6 +137,14 @@ def test_a_process_that_was_kept_from_running_catches_up_in_one_message(robot):
     assert status.robot_utime - before < 100_000  # what was missed for long is left out
 
 
+@pytest.mark.parametrize("by", [1.0, -1.0, 0.3, -0.06])
+def test_a_clock_that_is_set_silences_nobody(by):
+    robot = Robot()
+    robot.now += int(1e6 * by)
+    told = robot.wait(20)
+    assert [message.utime for message in told] == [robot.now - 1000 * k for k in range(19, -1, -1)]
+
+
 def test_joint_angles_and_speeds_are_as_noisy_as_said_and_by_seed(robot):
     told = robot.wait(300)
     for measured, desired, noise in (
