@@ -10,10 +10,9 @@ from rich.console import Console
 
 from riseg_drake.app.diagram import make_diagram
 from riseg_drake.app.graphics import require_graphics
-from riseg_drake.app.output_folder import OutputError
+from riseg_drake.app.output_folder import OutputError, write_told
 from riseg_drake.app.scenario import load_scenario
 from riseg_drake.pictures.object_colors import hex_color
-from riseg_drake.recording.whole_file import write_bytes
 
 STATION_COLOR, MEMORY_COLOR, STAGE_COLOR = "#d5e8f3", "#f9e3b8", "#eeeeee"
 UNUSED_COLOR = "#999999"
@@ -35,10 +34,7 @@ def diagram_command(scenario_file: Path | None, output: Path | None, console: Co
         print(dot, flush=True)
         return
     content = render(dot, "svg") if output.suffix == ".svg" else dot.encode()
-    try:
-        write_bytes(output, content)
-    except OSError as error:
-        raise OutputError(f"cannot write {output}: {error.strerror}") from None
+    write_told(output, content)
     console.print(f"drew {output}")
 
 

@@ -16,16 +16,14 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
 from time import sleep, time
-from typing import Any
 
 from rich.console import Console
 
 from riseg_drake.app.graphics import require_graphics
-from riseg_drake.app.output_folder import OutputError, to_json
+from riseg_drake.app.output_folder import to_json, write_told
 from riseg_drake.app.scenario import load_scenario, scenario_name
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.host.processes import deaf_children, end_with_parent
-from riseg_drake.recording.whole_file import write_text
 from riseg_drake.stations.emulated_arm import TICK_US, EmulatedArm
 from riseg_drake.stations.emulated_camera import EmulatedCamera
 from riseg_drake.stations.emulated_drivers import CameraSide, EmulatorConfig, Moment, PandaSide
@@ -35,7 +33,6 @@ from riseg_drake.stations.motion_judge import MotionVerdict
 from riseg_drake.stations.promptness import be_prompt
 from riseg_drake.stations.simulated import SimulatedStationConfig
 
-_DIED = "the process that draws the camera's pictures has died; it was out of memory, or the renderer broke"
 _GIVE_WAY = 2  # niceness of the camera's process: the status comes first, but pictures must not starve
 _PRIORITY = 10  # of the arm's process among real-time ones, where the system allows that
 _LONGEST_WAIT = 0.05  # s, until the camera's process listens for words again
@@ -74,7 +71,8 @@ def emulate_command(
     with _camera_process(scenario_file, seed, faults) as camera:
         with console.status("placing the objects"):
             arm = _place(station, config, seed)
-            complaint = _told_by(camera)
+            with _camera_lives():
+                complaint = camera.recv()
         if complaint:
             raise ScenarioError(complaint)
         console.print(
@@ -96,11 +94,7 @@ class CameraDiedError(RuntimeError):
 
 def write_verdict(file: Path, verdict: MotionVerdict) -> None:
     """How calm the arm's motion was, as JSON. Raises OutputError."""
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        write_text(Path(os.path.realpath(file)), to_json(asdict(verdict)))
-    except OSError as error:
-        raise OutputError(f"cannot write {file}: {error.strerror}") from None
+    write_told(file, to_json(asdict(verdict)).encode(), make_folder=True)
 
 
 def _place(station: SimulatedStationConfig, config: EmulatorConfig, seed: int) -> EmulatedArm:
@@ -120,12 +114,13 @@ def _run(side: PandaSide, config: EmulatorConfig, camera: Connection, console: C
     be_prompt(_PRIORITY)  # as the real arm, which has a computer of its own
     start = time()
     try:
-        _keep_time(side, camera, 1 / config.rate, console)
-    except (BrokenPipeError, ConnectionResetError):
-        raise CameraDiedError(_DIED) from None
+        with _camera_lives():
+            _keep_time(side, camera, 1 / config.rate, console)
     except KeyboardInterrupt:
         elapsed = time() - start
-        pictures = _last_said_by(camera)
+        with _camera_lives():
+            camera.send(None)
+            pictures = camera.recv()
         console.print(
             f"ended after {elapsed:.0f} s: status at {side.published / elapsed:.0f} Hz, "
             f"pictures at {pictures / elapsed:.1f} Hz"
@@ -148,21 +143,15 @@ def _keep_time(side: PandaSide, camera: Connection, period: float, console: Cons
         sleep(max(0.0, 1e-6 * (arm.wall_us + TICK_US - _wall_us())))
 
 
-def _told_by(camera: Connection) -> Any:
-    """What the camera's process says next. Raises CameraDiedError."""
+@contextmanager
+def _camera_lives() -> Iterator[None]:
+    """For talk with the camera's process in a `with`. Raises CameraDiedError."""
     try:
-        return camera.recv()
-    except (EOFError, ConnectionResetError):
-        raise CameraDiedError(_DIED) from None
-
-
-def _last_said_by(camera: Connection) -> int:
-    """How many pictures it has made, at the end. Raises CameraDiedError."""
-    try:
-        camera.send(None)
-    except (BrokenPipeError, ConnectionResetError):
-        raise CameraDiedError(_DIED) from None
-    return int(_told_by(camera))
+        yield
+    except (EOFError, BrokenPipeError, ConnectionResetError):
+        raise CameraDiedError(
+            "the process that draws the camera's pictures has died; it was out of memory, or the renderer broke"
+        ) from None
 
 
 @contextmanager

@@ -63,8 +63,8 @@ def films_command(
     path = output or Path("out") / f"films_seed_{seed}"
     own = [path / f"film_{film:03d}" for film in range(seed, seed + FILMS)]
     theirs = [path / recording.resolve().name for recording in real]
-    for clash in {*own} & {*theirs}:
-        raise RecordingError(f"a recording is named {clash.name}, as a film that is made here; rename it")
+    if clash := sorted(folder.name for folder in {*own} & {*theirs}):
+        raise RecordingError(f"a recording is named {clash[0]}, as a film that is made here; rename it")
     settings = {"suite": SUITE, "seed": seed, "scenario": str(scenario or "")}
     with _claimed(path, settings, [*own, *theirs], overwrite) as folder:
         rows: list[tuple[str, dict[str, Any]]] = []

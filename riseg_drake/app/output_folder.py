@@ -20,7 +20,7 @@ from typing import Any
 
 from riseg_drake.host.files import MOST_TEXT, FileError, read_text
 from riseg_drake.host.processes import undisturbed
-from riseg_drake.recording.whole_file import write_text
+from riseg_drake.recording.whole_file import write_bytes, write_text
 
 SUMMARY = "summary.json"
 PATIENCE = 2.0
@@ -38,6 +38,16 @@ _STATES = {"done": "finished", "interrupted": "stopped", "failed": "failed", "ru
 
 class OutputError(ValueError):
     """Why nothing can be written to an output folder, in one line."""
+
+
+def write_told(file: Path, content: bytes, *, make_folder: bool = False) -> None:
+    """A file in the place that a person named, where that is a link where it leads. Raises OutputError."""
+    try:
+        if make_folder:
+            file.parent.mkdir(parents=True, exist_ok=True)
+        write_bytes(Path(os.path.realpath(file)), content)
+    except OSError as error:
+        raise OutputError(f"cannot write {file}: {error.strerror}") from None
 
 
 class OutputFolder:

@@ -1,15 +1,13 @@
 """`riseg score`: two folders of label images, ten figures."""
 
-import os
 from pathlib import Path
 
 from rich.console import Console
 
-from riseg_drake.app.output_folder import OutputError, to_json
+from riseg_drake.app.output_folder import to_json, write_told
 from riseg_drake.app.tables import score_table
 from riseg_drake.evaluation.label_folders import score_folders
 from riseg_drake.evaluation.scores import mean_scores
-from riseg_drake.recording.whole_file import write_text
 
 MOST_ROWS = 20
 """More images than this are not listed one by one on the terminal."""
@@ -27,10 +25,7 @@ def score_command(predicted: Path, true: Path, json_file: Path | None, console: 
             "scores": mean.as_dict(),
             "images": {name: scores.as_dict() for name, scores in images.items()},
         }
-        try:
-            write_text(Path(os.path.realpath(json_file)), to_json(content))
-        except OSError as error:
-            raise OutputError(f"cannot write {json_file}: {error.strerror}") from None
+        write_told(json_file, to_json(content).encode())
     rows = [*images.items(), ("mean", mean)] if len(images) <= MOST_ROWS else [("mean", mean)]
     console.print(f"{len(images)} image{'s' if len(images) > 1 else ''}, figures in percent")
     console.print(score_table(rows, first="\nimage"))

@@ -98,7 +98,7 @@ def check_model(path: Path) -> None:
 def _check_mesh(model: Path, uri: str) -> None:
     """Raise ModelFileError where a mesh that is named by its path is there and is no file that can be read."""
     path = model.parent / uri.strip().removeprefix("file://")
-    if not uri.strip() or "://" in str(uri).removeprefix("file://"):
+    if not uri.strip() or "://" in uri.removeprefix("file://"):
         return  # of a package, which Drake finds
     try:
         found = os.stat(path)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
 from riseg_drake.segmentation.frame_pairs import camera_span
 from riseg_drake.segmentation.keyframe import Keyframe
+from riseg_drake.segmentation.surface import seek
 
 _ANOTHER_VIEW = 100.0
 """Pixels of the camera's motion from which smooth errors of depth are others."""
@@ -70,7 +71,7 @@ class Comparison(Immutable):
         """The keyframe's own frame and the other one."""
         return FramePair(self.keyframe.frame, self.frame)
 
-    @property
+    @cached_property
     def X_C1K(self) -> NDArray[np.float64]:
         """[4, 4], from the keyframe's camera to the frame's, as the poses have it."""
         return self.pair.X_C1C0
@@ -79,6 +80,18 @@ class Comparison(Immutable):
     def shift(self) -> float:
         """Pixels by which what stands still seems to have moved."""
         return self.view_error * min(camera_span(self.keyframe.frame, self.frame), _ANOTHER_VIEW)
+
+    @cached_property
+    def per_variance(self) -> NDArray:
+        """[W], 1 / variance of the difference between a witness's gray value and where it reappears."""
+        keyframe = self.keyframe
+        return 1 / (keyframe.variance + np.float32(self.shift) ** 2 * keyframe.gradient_squared)
+
+    @cached_property
+    def leaves(self) -> NDArray[np.float64]:
+        """[N], share of its witnesses that the camera's own motion takes out of the image."""
+        sought = seek(self.keyframe.witnesses, self.X_C1K)
+        return self.keyframe.share_of_witnesses(~sought.inside(self.frame.intrinsics.shape))
 
     @property
     def depth_error(self) -> float:

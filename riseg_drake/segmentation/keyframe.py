@@ -1,6 +1,7 @@
 """The picture of the last rest, cut into superpixels: what every later frame is compared with."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -74,6 +75,15 @@ class Keyframe(Immutable):
         return self.superpixels.length / max(
             1.0, float(np.sqrt(np.median(self.area))) if len(self.area) else 1.0
         )
+
+    @cached_property
+    def witness_count(self) -> NDArray[np.intp]:
+        """[N], how many witnesses each superpixel has."""
+        return np.bincount(self.owner, minlength=self.count)
+
+    def share_of_witnesses(self, which: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """Of each superpixel's witnesses the share [N] that is among some of them [W]."""
+        return np.bincount(self.owner, which, self.count) / np.maximum(self.witness_count, 1)
 
     @property
     def pixels_per_metre(self) -> float:

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.segmentation.comparison import Comparison
-from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.lighting import gray_costs
 from riseg_drake.segmentation.noise import depth_sigma
 from riseg_drake.segmentation.surface import seek
@@ -93,17 +92,15 @@ def motion_costs(
     keyframe = compared.keyframe
     errs = parameters.view_errors * compared.view_error
     depth_factors = (1.0, 1 - errs, 1 + errs) if parameters.view_errors * compared.shift > _SEEN else (1.0,)
-    shape = compared.frame.intrinsics.shape
-    left = _share(~seek(keyframe.witnesses, compared.X_C1K).inside(shape), keyframe)
     misfit, hidden = np.empty((2, len(motions_K), keyframe.count))
     for k, motion in enumerate(motions_K):
         still = np.array_equal(motion, np.eye(4))
         light = parameters.light_still if still else parameters.light
         factors = depth_factors if still else (1.0,)
         tries = [_misfit(compared, motion, factor, light, parameters) for factor in factors]
-        misfit[k], hidden[k] = np.min([t[0] for t in tries], axis=0), np.maximum(tries[0][1] - left, 0)
-    witnesses = np.bincount(keyframe.owner, minlength=keyframe.count).astype(float)
-    return Costs(misfit, witnesses, hidden)
+        misfit[k] = np.min([each for each, _ in tries], axis=0)
+        hidden[k] = np.maximum(tries[0][1] - compared.leaves, 0)
+    return Costs(misfit, keyframe.witness_count.astype(float), hidden)
 
 
 def _misfit(
@@ -124,7 +121,7 @@ def _misfit(
     photometric = gray_costs(
         keyframe.gray,
         sought.read_between(frame.unhidden_gray),
-        1 / (keyframe.variance + np.float32(compared.shift) ** 2 * keyframe.gradient_squared),
+        compared.per_variance,
         keyframe.owner,
         keyframe.count,
         parameters.residual_max,
@@ -138,12 +135,6 @@ def _misfit(
     both = photometric + np.where(z_1 > 0, 1 + of_depth * (geometric - 1), np.float32(1))
     lost = np.isnan(both)
     total = np.bincount(keyframe.owner, np.where(lost, EXPECTED, both), keyframe.count)
-    witnesses = np.bincount(keyframe.owner, minlength=keyframe.count)
+    witnesses = keyframe.witness_count
     misfit = np.divide(total, witnesses, out=np.full(keyframe.count, EXPECTED), where=witnesses > 0)
-    return misfit, _share(lost, keyframe)
-
-
-def _share(which: NDArray[np.bool_], keyframe: Keyframe) -> NDArray[np.float64]:
-    """Of each superpixel's witnesses the share [N] that is among some of them [W]."""
-    witnesses = np.bincount(keyframe.owner, minlength=keyframe.count)
-    return np.bincount(keyframe.owner, which, keyframe.count) / np.maximum(witnesses, 1)
+    return misfit, keyframe.share_of_witnesses(lost)
