@@ -18,9 +18,9 @@ from riseg_drake.pictures.masks import draw_masks
 from riseg_drake.stations.simulated import SimulatedStation
 from riseg_drake.systems.stage_clock import StageClock
 
-EVERY = 4
+EVERY = 8
 """Of so many pictures of the camera one is shown."""
-WIDTH = 680
+WIDTH = 620
 """Of the film, pixels."""
 
 

@@ -34,7 +34,7 @@ NAMES = (
     f"{HARDWARE}_diagram.svg",
     "evaluation.png",
 )
-RATE = 12.5
+RATE = 6.25
 """Of the film, pictures a second; it runs about three times as fast as the robot."""
 LAST = 2.0
 """How long its last picture stays, s."""
