@@ -114,18 +114,6 @@ def lay_pile(
     models: Sequence[ObjectModel], centre_W: Sequence[float], rng: np.random.Generator
 ) -> list[PlacedObject] | None:
     """Objects laid one after the other onto one place; None if they do not come to rest as a pile."""
-    try:
-        return _laid(models, centre_W, rng)
-    except RuntimeError as error:
-        # Now and then the contact solver makes a pose of no numbers out of a rare corner on a corner.
-        if "non-finite" not in str(error):
-            raise
-        return None
-
-
-def _laid(
-    models: Sequence[ObjectModel], centre_W: Sequence[float], rng: np.random.Generator
-) -> list[PlacedObject] | None:
     row = [[*np.add(centre_W, [-1.5, 0.25 * k]), -model.footprint.bottom] for k, model in enumerate(models)]
     waiting = [  # out of the way
         PlacedObject(model, RigidTransform(model.X_WB.rotation(), p_W))

@@ -12,7 +12,7 @@ from pydrake.geometry import (
     RenderCameraCore,
     RenderEngineVtkParams,
 )
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
@@ -325,6 +325,24 @@ def test_faces_laid_together_are_not_driven_apart(tmp_path):
     for before, after in zip(placed, settle(placed, (0.5, 0.0)), strict=True):
         assert np.linalg.norm(after.X_WB.translation() - before.X_WB.translation()) < 1e-4
         np.testing.assert_allclose(after.X_WB.rotation().matrix(), before.X_WB.rotation().matrix(), atol=2e-3)
+
+
+def test_thin_things_that_fall_onto_an_edge_do_not_jump_higher_than_they_fell(tmp_path):
+    inertial = (
+        "<inertial><mass>0.04</mass>"
+        "<inertia><ixx>3.3e-6</ixx><iyy>8.4e-5</iyy><izz>8.7e-5</izz></inertia></inertial>"
+    )
+    (tmp_path / "ruler.sdf").write_text(sdf(box(0.16, 0.03, 0.005), inertial=inertial))
+    ruler = find_model(str(tmp_path / "ruler.sdf"))
+    rng = np.random.default_rng(0)
+    falling = [
+        PlacedObject(ruler, RigidTransform(RollPitchYaw(rng.uniform(-np.pi, np.pi, 3)), [0.4 * k, 0.0, 0.2]))
+        for k in range(20)
+    ]
+    table = SettlingTable(falling, (4.0, 0.0))
+    for _ in range(5):
+        table.settle(0.4)
+        assert max(item.X_WB.translation()[2] for item in table.objects()) < 0.2
 
 
 def test_a_tower_of_boxes_is_at_rest_and_known_as_a_pile(tmp_path):
