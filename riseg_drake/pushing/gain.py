@@ -31,9 +31,11 @@ class GainParameters:
     """What turning the camera by half a turn takes off: it costs time, and takes the scene out of view."""
     tries: int = 2
     """What is still one after so many pushes is not pushed again."""
-    least: float = 0.1
-    """What is in doubt is not pushed for less than this: the push stirs what is well known, too. Nor is a push
-    made that is less new than this after one that changed nothing: within 1.5 cm and 0.6 rad it is the same."""
+    least: float = 0.03
+    """What is in doubt is not pushed for less than this: the push stirs what is well known, too."""
+    same: float = 0.1
+    """A push that is less new than this, after one that changed nothing, is not made: within 1.5 cm and 0.6 rad
+    it is the same."""
     tried_distance: float = 0.035
     """Distance, m, over which a push is like one that was made."""
 
@@ -80,5 +82,5 @@ def expected_gain(
         turn = np.arccos(np.clip(direction_W @ heading_W, -1.0, 1.0))
         gain *= 1.0 - parameters.turning * turn / np.pi
     in_vain = new[:, [not push.changed for push in tried]].min(axis=1, initial=1.0)
-    gain[in_vain < parameters.least] = 0.0
+    gain[in_vain < parameters.same] = 0.0
     return gain

@@ -242,10 +242,10 @@ def test_alone_comes_before_with_others(drawn):
 
 
 def test_what_is_in_doubt_is_left_alone_where_a_push_would_stir_more_than_it_settles(drawn):
-    drawn.box(0.5, 0.0, 0.03, 0.03, doubtful=3)
+    drawn.box(0.5, 0.0, 0.02, 0.02, doubtful=3)
     # Open on one side, towards which nothing can be pushed.
-    for x, y in ((0.47, 0.0), (0.53, 0.0), (0.5, 0.03)):
-        drawn.box(x, y, 0.028, 0.03, segmented=True)
+    for x, y in ((0.475, 0.0), (0.525, 0.0), (0.5, 0.025)):
+        drawn.box(x, y, 0.028, 0.028, segmented=True)
     decision = decide(drawn.map())
     assert decision.ending is Ending.NOTHING_VALID
     assert decision.failed[Criterion.NOT_IN_VAIN] > decision.candidates / 2
