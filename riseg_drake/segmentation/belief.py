@@ -37,6 +37,8 @@ class BeliefParameters:
     """Evidence of a border that lies inside what was one superpixel before, nats."""
     most: float = 12.0
     """Evidence of a border adds up to no more than that, nats, so that it can be revised."""
+    weaker: list[float] = field(default_factory=lambda: [0.5, 1.0, 1.5])
+    """Log-odds by which all bonds are weakened in turn, to see what else may be a body."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,8 @@ class Belief(Immutable):
     next_id: int
     part: NDArray[np.intp]
     """[N], 0.., which superpixels are one body by all that is known: what has not moved, too."""
+    finer: NDArray[np.intp]
+    """[L, N], the same if all bonds were weaker."""
 
     @property
     def bond(self) -> NDArray[np.float64]:
@@ -86,6 +90,7 @@ def first_belief(
         body=np.zeros(keyframe.count, np.intp),
         next_id=1,
         part=partition(keyframe, prior, parameters.partition),
+        finer=_finer(keyframe, prior, parameters),
     )
 
 
@@ -188,6 +193,7 @@ def next_belief(
         body=body,
         next_id=bodies.next_id,
         part=partition(new, prior + evidence, parameters.partition),
+        finer=_finer(new, prior + evidence, parameters),
     )
 
 
@@ -207,6 +213,11 @@ def rebased(then: Bodies, now: Bodies, old: Keyframe, following: Belief) -> Bodi
         since = then.motions_K[k] @ inverse(now.motions_K[now.motion[mine][0]])
         motions.append(X_NO @ since @ inverse(X_NO))
     return Bodies(following.body, motion, np.array(motions), following.next_id)
+
+
+def _finer(keyframe: Keyframe, bond: NDArray[np.float64], parameters: BeliefParameters) -> NDArray[np.intp]:
+    parts = [partition(keyframe, bond - by, parameters.partition) for by in parameters.weaker]
+    return np.array(parts, np.intp).reshape(-1, keyframe.count)
 
 
 def _carried_evidence(

@@ -67,18 +67,29 @@ class Costs:
         misfit, hidden = np.vstack([self.misfit, other.misfit]), np.vstack([self.hidden, other.hidden])
         return Costs(misfit, self.witnesses, hidden)
 
+    def excess(self, parameters: LikelihoodParameters) -> NDArray[np.float64]:
+        """[G, N], how much worse each motion is than one that is right would be, nats, bounded."""
+        level, scale = self._noise(parameters)
+        return np.minimum(
+            np.maximum(self.misfit - parameters.chance * level, 0) * scale, parameters.superpixel_max
+        )
+
     def nats(self, parameters: LikelihoodParameters) -> NDArray[np.float64]:
         """[G, N], how much worse than the best each motion is, by the noise that is there, bounded.
 
         A residual within the noise says no more than that: what is better by chance is no better. So a blank
         surface, which any motion along itself explains, speaks for none of them.
         """
+        level, scale = self._noise(parameters)
+        misfit = np.maximum(self.misfit, parameters.chance * level) + parameters.hidden * level * self.hidden
+        return np.minimum((misfit - misfit.min(0)) * scale, parameters.superpixel_max)
+
+    def _noise(self, parameters: LikelihoodParameters) -> tuple[float, NDArray[np.float64]]:
+        """The mean squared residual that is usual where a motion is right, and nats [N] for each more."""
         asked = self.witnesses > parameters.correlated_pixels
         level = float(np.median(self.misfit.min(0)[asked])) if asked.any() else EXPECTED
-        misfit = np.maximum(self.misfit, parameters.chance * level) + parameters.hidden * level * self.hidden
         dispersion = max(1.0, level / EXPECTED)
-        scale = self.witnesses / (2 * parameters.correlated_pixels * dispersion)
-        return np.minimum((misfit - misfit.min(0)) * scale, parameters.superpixel_max)
+        return level, self.witnesses / (2 * parameters.correlated_pixels * dispersion)
 
 
 def motion_costs(

@@ -6,7 +6,7 @@ are sharpened, on ever more of what they explain. A patch of a blank thing tells
 with all of what may be one body, whose outline and height tell.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import cv2
@@ -45,8 +45,6 @@ class MotionSearchParameters:
     """Valleys that are gone down."""
     unexplained: float = 3.0
     """Mean squared residuals from which a superpixel is not explained."""
-    weaker: list[float] = field(default_factory=lambda: [0.5, 1.0, 1.5])
-    """Log-odds by which all bonds are weakened in turn, to see what else may be a body."""
     same_flow: float = 1.0
     """Pixels (root mean square) within which two motions are one, and what moves stands still."""
     rounds: int = 24
@@ -89,7 +87,7 @@ def search_motions(
         area_min: m^2; what is large enough for a body.
     """
     keyframe = compared.keyframe
-    search = _Search(compared, above, divisions, gain_min, parameters, likelihood)
+    search = _Search(compared, above, divisions, gain_min, parameters, likelihood, np.empty((0, 4, 4)))
     asked = search.costs.witnesses > likelihood.correlated_pixels
     tried = np.zeros(keyframe.count, bool)
     pixels_min = area_min * keyframe.pixels_per_metre**2
@@ -114,6 +112,48 @@ def search_motions(
     for motion in proposed_K:
         search.take(search.sharpened(motion), np.zeros(keyframe.count, bool))
     return np.array(search.found).reshape(-1, 4, 4)
+
+
+def missing_motion(
+    compared: Comparison,
+    above: AboveTable,
+    divisions: NDArray[np.intp],
+    known_K: NDArray[np.float64],
+    gain_min: float,
+    parameters: MotionSearchParameters,
+    likelihood: LikelihoodParameters,
+    area_min: float,
+) -> NDArray[np.float64]:
+    """The one motion [0 or 1, 4, 4] that is missed most beside standing still and known ones [G, 4, 4].
+
+    For a frame in motion, of which there are many: one body is asked about, with few points, and the best
+    valley alone is gone down; the motion must explain most of what is missed there. The parameters are those of
+    `search_motions`.
+    """
+    keyframe = compared.keyframe
+    bodies = _possible_bodies(divisions, keyframe.area, area_min * keyframe.pixels_per_metre**2)
+    if not len(bodies):
+        return np.empty((0, 4, 4))
+    # What moves less far than the grid's step will be seen at the next rest; poses err by as much.
+    least = parameters.step * keyframe.pixels_per_metre
+    quick = replace(parameters, best=1, samples=parameters.samples // 3, same_flow=least)
+    search = _Search(compared, above, divisions, gain_min, quick, likelihood, known_K)
+    missed = _missed(bodies, search.costs, likelihood)
+    # More than a motion's price, for its size: not a sliver, and not a heap of which one thing moves.
+    worst = int(((missed - gain_min) / (bodies @ keyframe.area)).argmax())
+    body = bodies[worst]
+    motion = search.best_motion(body, np.where(body, 0.0, np.inf)) if missed[worst] >= gain_min else None
+    if motion is not None:
+        left = _missed(body[None], search.costs.with_motion(motion[2]), likelihood)
+        if 2 * left[0] < missed[worst]:
+            search.take(motion, body)
+    return np.array(search.found[len(known_K) :]).reshape(-1, 4, 4)
+
+
+def _missed(bodies: NDArray[np.bool_], costs: Costs, parameters: LikelihoodParameters) -> NDArray[np.float64]:
+    """[B], nats by which the best motion of each of bodies [B, N] falls short of one that is right."""
+    missed: NDArray[np.float64] = (bodies @ costs.excess(parameters).T).min(1)
+    return missed
 
 
 def unexplained_parts(nats: NDArray[np.float64], part: NDArray[np.intp]) -> NDArray[np.float64]:
@@ -145,6 +185,7 @@ class _Search:
         gain_min: float,
         parameters: MotionSearchParameters,
         likelihood: LikelihoodParameters,
+        known_K: NDArray[np.float64],
     ):
         self._compared = compared
         self._keyframe, self._frame = keyframe, frame = compared.keyframe, compared.frame
@@ -164,9 +205,9 @@ class _Search:
         """[N, 2], m, of each superpixel, about."""
         self._standing = above.mask.astype(np.float32)
         self._normal = keyframe.frame.X_WC[:3, :3].T @ keyframe.above.plane_W[:3]
-        self.found: list[NDArray] = []
+        self.found: list[NDArray] = list(known_K)
         """Motions [4, 4]."""
-        self.costs = self._costs(np.eye(4))
+        self.costs = motion_costs(compared, np.concatenate([np.eye(4)[None], known_K]), likelihood)
         """Of standing still, and of those."""
 
     def take(self, motion: tuple[float, NDArray, Costs] | None, patch: NDArray[np.bool_]) -> bool:

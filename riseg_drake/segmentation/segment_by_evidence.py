@@ -6,6 +6,7 @@ pictures are sharp, have depth, and span all that happened: that pair decides, i
 second frame becomes the keyframe.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import cv2
@@ -32,10 +33,10 @@ from riseg_drake.segmentation.candidates import candidate_motions
 from riseg_drake.segmentation.comparison import Comparison, renewed_view_error
 from riseg_drake.segmentation.frame_pairs import camera_span
 from riseg_drake.segmentation.memory import Memory, draw_memory, moved_memory, remember
-from riseg_drake.segmentation.motion_search import MotionSearchParameters, search_motions
+from riseg_drake.segmentation.motion_search import MotionSearchParameters, missing_motion, search_motions
 from riseg_drake.segmentation.motions import BFIFGroups
 from riseg_drake.segmentation.observation import Observation, ObservationParameters, observe
-from riseg_drake.segmentation.partition import margins, partition
+from riseg_drake.segmentation.partition import margins
 from riseg_drake.segmentation.propagation import UNKNOWN, pixels_of
 from riseg_drake.segmentation.rest import RestParameters, is_still
 from riseg_drake.segmentation.segmentation import Segmentation
@@ -59,6 +60,8 @@ class EvidenceParameters:
     do not rest."""
     uncovered: float = 0.3
     """Share of what stands there that the keyframe does not show, from which the view needs another."""
+    search_every: float = 0.4
+    """s between two frames in motion in which a motion is looked for that no group proposes: what is blank."""
     memory: bool = True
     """Remember objects that leave the view (not in the paper)."""
 
@@ -113,11 +116,15 @@ def segment_by_evidence(
             or _leaves_keyframe(belief, bodies, frame, above_1, parameters)
         )
     )
+    if not deciding and now.still_since is None and frame.time - now.searched >= parameters.search_every:
+        now = replace(now, searched=frame.time)
+        missing_K = _sought(missing_motion, belief, compared, above_1, candidates_K, parameters)
+        candidates_K = np.concatenate([candidates_K, missing_K])
     if len(candidates_K) and not deciding:
         seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters)
         deciding = _has_gone_far(now, frame, seen, bodies, parameters)
     if deciding:
-        candidates_K = _searched(belief, compared, above_1, candidates_K, parameters)
+        candidates_K = _sought(search_motions, belief, compared, above_1, candidates_K, parameters)
         if len(candidates_K):
             at_rest = now.still_since is not None
             seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters, at_rest=at_rest)
@@ -172,21 +179,19 @@ def _explained(
     return bodies_of(belief, seen, before, parameters.belief, at_rest=at_rest)
 
 
-def _searched(
+def _sought(
+    search: Callable[..., NDArray[np.float64]],
     belief: Belief,
     compared: Comparison,
     above: AboveTable,
     candidates_K: NDArray[np.float64],
     parameters: EvidenceParameters,
 ) -> NDArray[np.float64]:
-    finer = [
-        partition(belief.keyframe, belief.bond - by, parameters.belief.partition)
-        for by in parameters.search.weaker
-    ]
-    return search_motions(
+    """Motions [C, 4, 4] that explain a frame, by one of the functions of `motion_search`."""
+    return search(
         compared,
         above,
-        np.array([belief.part, *finer]),
+        np.vstack([belief.part[None], belief.finer]),
         candidates_K,
         parameters.observation.motion_cost,
         parameters.search,

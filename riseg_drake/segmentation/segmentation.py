@@ -35,6 +35,8 @@ class Segmentation(Immutable):
     """s; None while something moves."""
     decided: bool = True
     """Whether the present rest has been looked at."""
+    searched: float = float("-inf")
+    """s; when a motion that nothing proposed was looked for."""
     view_error: ViewError = field(default_factory=ViewError)
     """What the pairs so far have shown of it."""
     memory: Memory = field(default_factory=dict)

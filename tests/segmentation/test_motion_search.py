@@ -8,6 +8,7 @@ from riseg_drake.segmentation.belief import BeliefParameters, first_belief
 from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.motion_search import (
     MotionSearchParameters,
+    missing_motion,
     search_motions,
     slides,
     unexplained_parts,
@@ -15,7 +16,6 @@ from riseg_drake.segmentation.motion_search import (
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.observation import ObservationParameters, observe
-from riseg_drake.segmentation.partition import PartitionParameters, partition
 from tests.segmentation.drawn_scene import (
     Blank,
     DrawnScene,
@@ -61,19 +61,15 @@ class Moved:
         self.compared = Comparison(self.belief.keyframe, pair.current, DEPTH_NOISE, view_error=0.01)
         self.motions_K = {k: motion_seen_from(OVER, PLACES[k], poses[k]) for k in after}
 
-    def search(self, *proposed: np.ndarray) -> np.ndarray:
-        parameters, search = ObservationParameters(), MotionSearchParameters()
-        finer = [
-            partition(self.belief.keyframe, self.belief.bond - by, PartitionParameters())
-            for by in search.weaker
-        ]
-        return search_motions(
+    def search(self, *proposed: np.ndarray, search=search_motions) -> np.ndarray:
+        parameters = ObservationParameters()
+        return search(
             self.compared,
             self.above,
-            np.array([self.belief.part, *finer]),
+            np.vstack([self.belief.part[None], self.belief.finer]),
             np.array(proposed).reshape(-1, 4, 4),
             parameters.motion_cost,
-            search,
+            MotionSearchParameters(),
             parameters.likelihood,
             BeliefParameters().partition.area_min,
         )
@@ -120,6 +116,33 @@ def test_what_was_seen_in_motion_is_taken_where_the_search_does_not_reach():
 def test_but_not_beside_a_motion_that_was_found():
     moved = Moved(FAR)
     assert len(moved.search(*moved.motions_K.values())) == len(moved.search()) == 2
+
+
+BLANK = [Blank(90.0), Texture(1), Texture(2)]
+
+
+@pytest.mark.renders
+def test_in_motion_the_blank_box_that_no_group_proposes_is_found_and_nothing_else():
+    moved = Moved({0: (-0.085, 0.018, 0.25)}, BLANK)
+    found = moved.search(search=missing_motion)
+    assert len(found) == 1
+    assert moved.error(0, found) < 2
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize("k", [0, 2])
+def test_in_motion_what_is_known_is_not_looked_for(k):
+    moved = Moved(FAR)
+    known = moved.motions_K[k]
+    (found,) = moved.search(known, search=missing_motion)
+    assert moved.error(2 - k, found[None]) < 0.3
+    assert len(moved.search(*moved.motions_K.values(), search=missing_motion)) == 0
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize("after", [{}, {0: (-0.069, 0.001, 0.0)}, {2: (0.056, 0.012, 0.0)}])
+def test_in_motion_nothing_is_found_where_nothing_moves_or_by_less_than_a_step(after):
+    assert len(Moved(after).search(search=missing_motion)) == 0
 
 
 def test_the_one_motion_of_a_part_falls_short_of_the_best_of_each_superpixel():
