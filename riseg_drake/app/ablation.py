@@ -31,6 +31,7 @@ AS_IN_THE_PAPER: dict[str, Switch] = {
 WITHOUT: dict[str, Switch] = {
     "no motions proposed by lines 3 to 6": {"bfif.grouping.members_min": 10**6},
     "no motions searched for at rest": {"segment.evidence.search.rounds": 0},
+    "no motions searched for in motion": {"segment.evidence.search_every": 1e6},
     "nothing of borders from the still picture": {
         f"segment.evidence.belief.prior.{cue}": 0.0 for cue in ("dent", "valley", "color", "hole")
     },

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 
 from riseg_drake.geometry.camera import rays
-from riseg_drake.geometry.se3 import skew
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.alignment import AlignmentParameters, rigid_fit
 from riseg_drake.segmentation.comparison import Comparison
-from riseg_drake.segmentation.likelihood import EXPECTED, Costs, LikelihoodParameters, motion_costs
+from riseg_drake.segmentation.likelihood import Costs, LikelihoodParameters, motion_costs
 from riseg_drake.segmentation.motions import flow_difference
+from riseg_drake.segmentation.slides import SlideCosts, slides
 
 
 @dataclass
@@ -126,9 +126,9 @@ def missing_motion(
 ) -> NDArray[np.float64]:
     """The one motion [0 or 1, 4, 4] that is missed most beside standing still and known ones [G, 4, 4].
 
-    For a frame in motion, of which there are many: one body is asked about, with few points, and the best
-    valley alone is gone down; the motion must explain most of what is missed there. The parameters are those of
-    `search_motions`.
+    For a frame in motion, of which there are many: one body, of `area_min` m^2 or more, is asked about, with few
+    points, and the best valley alone is gone down. The motion must explain most of what is missed there,
+    `gain_min` nats at least. The parameters are those of `search_motions`.
     """
     keyframe = compared.keyframe
     bodies = _possible_bodies(divisions, keyframe.area, area_min * keyframe.pixels_per_metre**2)
@@ -188,22 +188,18 @@ class _Search:
         known_K: NDArray[np.float64],
     ):
         self._compared = compared
-        self._keyframe, self._frame = keyframe, frame = compared.keyframe, compared.frame
+        self._keyframe, self._frame = compared.keyframe, compared.frame
+        keyframe = compared.keyframe
         self._divisions, self._gain_min = divisions, gain_min
         self._parameters, self._likelihood = parameters, likelihood
         self._fit = rigid_fit(compared.pair, compared.depth_noise)
-        self._gray_0, self._gray_1 = (self._blurred(f.gray) for f in (keyframe.frame, frame))
-        gradient = np.hypot(
-            *(cv2.Sobel(keyframe.frame.gray, cv2.CV_32F, *d, scale=0.125) for d in ((1, 0), (0, 1)))
-        )
-        self._variance = 8 + (0.5 * parameters.blur * self._blurred(gradient)) ** 2
+        self._slides = SlideCosts(compared, above.mask, parameters.blur, likelihood.residual_max)
         self._rng = np.random.default_rng(keyframe.frame.sequence)
         label = keyframe.image_of(np.arange(keyframe.count), -1)
         v, u = np.nonzero(label >= 0)
         middle = [np.bincount(label[v, u], x, keyframe.count) / np.maximum(keyframe.area, 1) for x in (v, u)]
         self._middle = np.stack(middle, axis=1) / keyframe.pixels_per_metre
         """[N, 2], m, of each superpixel, about."""
-        self._standing = above.mask.astype(np.float32)
         self._normal = keyframe.frame.X_WC[:3, :3].T @ keyframe.above.plane_W[:3]
         self.found: list[NDArray] = list(known_K)
         """Motions [4, 4]."""
@@ -309,9 +305,9 @@ class _Search:
         turns = np.arange(-parameters.turn, parameters.turn + 1e-9, parameters.turn_step)
         grid = np.stack(np.meshgrid(shifts, shifts, turns, indexing="ij"), axis=-1)
         motions = slides(self._normal, p_KQ.mean(0), grid.reshape(-1, 3))
-        cost = self._mean_costs(p_KQ, self._gray_0[v, u], self._variance[v, u], motions)
+        cost = self._slides.of(p_KQ, v, u, motions)
         if len(beside):
-            cost += self._taken(beside, motions)
+            cost += self._slides.taken(beside, motions)
         cost = cost.reshape(grid.shape[:3])
         lowest = np.flatnonzero((cost == minimum_filter(cost, 5)).ravel())
         order = lowest[np.argsort(cost.ravel()[lowest])][: parameters.best]
@@ -329,50 +325,3 @@ class _Search:
         n = self._normal / np.linalg.norm(self._normal)
         r = rays(self._frame.intrinsics)[v[some], u[some]]
         return r * (np.median(p_KQ @ n) / (r @ n))[:, None]
-
-    def _taken(self, p_KQ: NDArray, motions: NDArray) -> NDArray:
-        """How many of free points [S, 3] motions [H, 4, 4] take where it is not free, in squared residuals."""
-        u, v, _ = self._places(p_KQ, motions)
-        taken = cv2.remap(self._standing, u, v, cv2.INTER_LINEAR, borderValue=0)
-        return self._likelihood.residual_max * taken.mean(1)
-
-    def _mean_costs(self, p_KQ: NDArray, gray: NDArray, variance: NDArray, motions: NDArray) -> NDArray:
-        """Mean squared residuals [H] under motions [H, 4, 4] of S points with gray values and variances."""
-        frame = self._frame
-        u, v, z = self._places(p_KQ, motions)
-        found = cv2.remap(self._gray_1, u, v, cv2.INTER_LINEAR, borderValue=0)
-        z_1 = cv2.remap(frame.unhidden_depth, u, v, cv2.INTER_NEAREST, borderValue=0)
-        most = self._likelihood.residual_max
-        cost = np.minimum((found - gray) ** 2 / variance, most)
-        sigma = np.float32(2 * np.sqrt(2) * self._compared.depth_noise) * z**2
-        cost += np.where(z_1 > 0, np.minimum(((z_1 - z) / sigma) ** 2, most), EXPECTED / 2)
-        return cost.mean(1)
-
-    def _places(self, p_KQ: NDArray, motions: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-        """Where motions [H, 4, 4] take points [S, 3] in the frame: u, v, pixels, and depth, m, [H, S]."""
-        frame = self._frame
-        k = frame.intrinsics
-        K = np.array([[k.fx, 0, k.cx], [0, k.fy, k.cy], [0, 0, 1]])
-        P = (K @ (self._compared.X_C1K @ motions)[:, :3]).astype(np.float32)
-        homogeneous = np.column_stack([p_KQ, np.ones(len(p_KQ))]).astype(np.float32)
-        zu, zv, z = np.moveaxis((P.reshape(-1, 4) @ homogeneous.T).reshape(len(P), 3, -1), 1, 0)
-        u, v = zu / z, zv / z
-        return u, v, z
-
-    def _blurred(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
-        return cv2.GaussianBlur(image, (0, 0), self._parameters.blur)
-
-
-def slides(normal: NDArray, centre: NDArray, amounts: NDArray) -> NDArray[np.float64]:
-    """Motions [H, 4, 4] of things on a plane: shifted along it by two of `amounts` [H, 3], m, and turned about
-    its normal [3] through a centre [3] by the third, rad."""
-    n = normal / np.linalg.norm(normal)
-    first = np.cross(n, np.eye(3)[np.abs(n).argmin()])
-    first /= np.linalg.norm(first)
-    along = np.stack([first, np.cross(n, first)])
-    K = skew(n)
-    sine, cosine = np.sin(amounts[:, 2, None, None]), np.cos(amounts[:, 2, None, None])
-    X = np.tile(np.eye(4), (len(amounts), 1, 1))
-    X[:, :3, :3] += sine * K + (1 - cosine) * (K @ K)
-    X[:, :3, 3] = centre - X[:, :3, :3] @ centre + amounts[:, :2] @ along
-    return X

@@ -10,12 +10,12 @@ from riseg_drake.segmentation.motion_search import (
     MotionSearchParameters,
     missing_motion,
     search_motions,
-    slides,
     unexplained_parts,
 )
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.observation import ObservationParameters, observe
+from riseg_drake.segmentation.slides import slides
 from tests.segmentation.drawn_scene import (
     Blank,
     DrawnScene,
