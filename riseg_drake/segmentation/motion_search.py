@@ -126,8 +126,8 @@ def missing_motion(
 ) -> NDArray[np.float64]:
     """The one motion [0 or 1, 4, 4] that is missed most beside standing still and known ones [G, 4, 4].
 
-    For a frame in motion, of which there are many: one body, of `area_min` m^2 or more, is asked about, with few
-    points, and the best valley alone is gone down. The motion must explain most of what is missed there,
+    For a frame in motion, of which there are many: one body, of `area_min` m^2 or more, is asked about, with
+    few points, and the best valley alone is gone down. The motion must explain most of what is missed there,
     `gain_min` nats at least. The parameters are those of `search_motions`.
     """
     keyframe = compared.keyframe

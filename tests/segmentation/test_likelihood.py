@@ -94,6 +94,13 @@ def test_nats_are_squared_residuals_by_what_is_usual_and_no_more_than_a_superpix
     np.testing.assert_allclose(twice, [[0, 0, 4], [0, 4, 0]])
 
 
+def test_excess_is_what_no_motion_explains_beyond_what_may_be_by_chance() -> None:
+    # As above, but against a motion that is right; the third is explained by neither, the fourth says too much.
+    misfit, witnesses = np.array([[2.0, 2.0, 5.0, 18.0], [2.5, 4.0, 4.0, 2.0]]), np.full(4, 24.0)
+    excess = Costs(misfit, witnesses, np.zeros((2, 4))).excess(LikelihoodParameters())
+    np.testing.assert_allclose(excess, [[0, 0, 2.0 * 2, 4], [0, 1.0 * 2, 1.0 * 2, 0]])
+
+
 def test_what_a_motion_hides_is_no_match_but_worse_by_what_is_usual() -> None:
     # The second motion hides half of it. What is usual is 2: half of that, for 24 pixels that count as 4.
     misfit, witnesses = np.array([[2.5], [2.0]]), np.array([24.0])
