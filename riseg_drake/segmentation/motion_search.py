@@ -7,6 +7,7 @@ with all of what may be one body, whose outline and height tell.
 """
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import product
 
 import cv2
@@ -189,22 +190,33 @@ class _Search:
     ):
         self._compared = compared
         self._keyframe, self._frame = compared.keyframe, compared.frame
-        keyframe = compared.keyframe
+        self._above = above
         self._divisions, self._gain_min = divisions, gain_min
         self._parameters, self._likelihood = parameters, likelihood
         self._fit = rigid_fit(compared.pair, compared.depth_noise)
-        self._slides = SlideCosts(compared, above.mask, parameters.blur, likelihood.residual_max)
-        self._rng = np.random.default_rng(keyframe.frame.sequence)
-        label = keyframe.image_of(np.arange(keyframe.count), -1)
-        v, u = np.nonzero(label >= 0)
-        middle = [np.bincount(label[v, u], x, keyframe.count) / np.maximum(keyframe.area, 1) for x in (v, u)]
-        self._middle = np.stack(middle, axis=1) / keyframe.pixels_per_metre
-        """[N, 2], m, of each superpixel, about."""
-        self._normal = keyframe.frame.X_WC[:3, :3].T @ keyframe.above.plane_W[:3]
+        self._rng = np.random.default_rng(compared.keyframe.frame.sequence)
+        self._normal = compared.keyframe.frame.X_WC[:3, :3].T @ compared.keyframe.above.plane_W[:3]
         self.found: list[NDArray] = list(known_K)
         """Motions [4, 4]."""
         self.costs = motion_costs(compared, np.concatenate([np.eye(4)[None], known_K]), likelihood)
         """Of standing still, and of those."""
+
+    # In motion most looks end with the costs above: what follows is made when it is asked for.
+
+    @cached_property
+    def _slides(self) -> SlideCosts:
+        return SlideCosts(
+            self._compared, self._above.mask, self._parameters.blur, self._likelihood.residual_max
+        )
+
+    @cached_property
+    def _middle(self) -> NDArray[np.float64]:
+        """[N, 2], m, of each superpixel, about."""
+        keyframe = self._keyframe
+        label = keyframe.image_of(np.arange(keyframe.count), -1)
+        v, u = np.nonzero(label >= 0)
+        middle = [np.bincount(label[v, u], x, keyframe.count) / np.maximum(keyframe.area, 1) for x in (v, u)]
+        return np.stack(middle, axis=1) / keyframe.pixels_per_metre
 
     def take(self, motion: tuple[float, NDArray, Costs] | None, patch: NDArray[np.bool_]) -> bool:
         """Add a motion [4, 4], with its gain, nats, and its costs, if it is worth it and takes a patch [N]

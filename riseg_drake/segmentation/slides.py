@@ -54,7 +54,7 @@ class SlideCosts:
 
 
 def slides(normal: NDArray, centre: NDArray, amounts: NDArray) -> NDArray[np.float64]:
-    """Motions [H, 4, 4] of things on a plane: shifted along it by two of `amounts` [H, 3], m, and turned about
+    """Motions [G, 4, 4] of things on a plane: shifted along it by two of `amounts` [G, 3], m, and turned about
     its normal [3] through a centre [3] by the third, rad."""
     n = normal / np.linalg.norm(normal)
     first = np.cross(n, np.eye(3)[np.abs(n).argmin()])
