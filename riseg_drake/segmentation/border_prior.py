@@ -46,7 +46,9 @@ def border_prior(keyframe: Keyframe, parameters: BorderPriorParameters) -> NDArr
     weight = np.array(
         [parameters.step, parameters.dent, parameters.valley, parameters.color, parameters.hole], np.float64
     )
-    return np.clip(parameters.smooth + cues @ weight, parameters.least, parameters.most)
+    odds = np.clip(parameters.smooth + cues @ weight, parameters.least, parameters.most)
+    # Of what may go on behind something the still picture says nothing.
+    return np.where(keyframe.superpixels.behind, 0.0, odds)
 
 
 def border_cues(keyframe: Keyframe) -> NDArray[np.float64]:

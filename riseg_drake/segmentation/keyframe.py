@@ -13,7 +13,12 @@ from riseg_drake.geometry.rgbd import Frame, Immutable
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.alignment import EdgePixels, edge_pixels, has_contrast
 from riseg_drake.segmentation.noise import MeasurementNoise, gray_variance
-from riseg_drake.segmentation.superpixels import Superpixels, split_superpixels, superpixels
+from riseg_drake.segmentation.superpixels import (
+    Superpixels,
+    split_superpixels,
+    superpixels,
+    with_occlusions,
+)
 from riseg_drake.segmentation.surface import SurfacePixels, surface_pixels
 
 _RIM = np.ones((5, 5), np.uint8)
@@ -30,6 +35,8 @@ class KeyframeParameters:
     """m on the object; size of the superpixels, each of which is taken to lie on one body."""
     edge_pixels: int = 6000
     """At most so many pixels sharpen motions."""
+    behind: float = 0.012
+    """m; surfaces on both sides of what is in front of them may be one if they are as high within that."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +54,7 @@ class Keyframe(Immutable):
     area: NDArray[np.intp]
     """[N], pixels of each superpixel."""
     witnesses: SurfacePixels
-    """The pixels that are asked: with depth, and not on the rim."""
+    """The pixels that are asked: with depth, not on the rim, every second one; neighbours err alike."""
     owner: NDArray[np.intp]
     """[W], superpixel of each witness."""
     gray: NDArray[np.float32]
@@ -66,7 +73,7 @@ class Keyframe(Immutable):
 
     @property
     def borders(self) -> NDArray[np.intp]:
-        """[M, 2], pairs of superpixels that touch."""
+        """[M, 2], pairs of superpixels that touch, or may be one behind what is between them."""
         return self.superpixels.borders
 
     @property
@@ -112,11 +119,13 @@ def make_keyframe(
     cut = superpixels(frame.color[region], height, above.mask[region], size)
     if bodies is not None:
         cut = split_superpixels(cut, bodies[region])
+    cut = with_occlusions(cut, cv2.medianBlur(height, 5), parameters.behind)
     owner = np.full(above.mask.shape, -1, np.intp)
     owner[region] = cut.label
     variance = gray_variance(frame.gray, noise)
     measured = cv2.morphologyEx((frame.depth > 0).view(np.uint8), cv2.MORPH_CLOSE, _PINHOLE)
     core = cv2.erode(measured * (owner >= 0).view(np.uint8), _RIM, borderValue=0) > 0
+    core[::2, ::2] = core[1::2, 1::2] = False
     witnesses = surface_pixels(core, frame.depth, frame.intrinsics)
     v, u = witnesses.pixel
     return Keyframe(

@@ -32,11 +32,12 @@ class LikelihoodParameters:
     turn."""
     light_still: float = 0.02
     """The same where nothing moves: shading stays what it was."""
-    correlated_pixels: float = 6.0
-    """Errors of gray are alike in about so many pixels (pose, interpolation); they count as one."""
-    correlated_depth: float = 28.0
-    """The same of depth, whose errors are those of matching windows: 4 pi sigma^2 for noise that is smoothed
-    over 1.5 pixels (docs/sensing.md)."""
+    correlated_gray: float = 3.0
+    """Errors of gray are alike in about so many witnesses, or six pixels (pose, interpolation); they count as
+    one."""
+    correlated_depth: float = 14.0
+    """The same of depth, whose errors are those of matching windows: half of 4 pi sigma^2, pixels, for noise
+    that is smoothed over 1.5 pixels (docs/sensing.md)."""
     chance: float = 1.5
     """Times the mean squared residual that is usual, up to which a superpixel's may be by chance."""
     view_error: float = 0.01
@@ -86,10 +87,10 @@ class Costs:
 
     def _noise(self, parameters: LikelihoodParameters) -> tuple[float, NDArray[np.float64]]:
         """The mean squared residual that is usual where a motion is right, and nats [N] for each more."""
-        asked = self.witnesses > parameters.correlated_pixels
+        asked = self.witnesses > parameters.correlated_gray
         level = float(np.median(self.misfit.min(0)[asked])) if asked.any() else EXPECTED
         dispersion = max(1.0, level / EXPECTED)
-        return level, self.witnesses / (2 * parameters.correlated_pixels * dispersion)
+        return level, self.witnesses / (2 * parameters.correlated_gray * dispersion)
 
 
 def motion_costs(
@@ -136,13 +137,13 @@ def _misfit(
         keyframe.owner,
         keyframe.count,
         parameters.residual_max,
-        parameters.correlated_pixels / light**2,
+        parameters.correlated_gray / light**2,
     )
     z = sought.depth / np.float32(depth_factor)  # as it is measured
     noise = float(np.sqrt(2)) * compared.depth_noise
     sigma = np.hypot(depth_sigma(z, noise), np.float32(compared.depth_error) * z)
     geometric = np.minimum(((z_1 - z) / sigma) ** 2, np.float32(parameters.residual_max))
-    of_depth = np.float32(parameters.correlated_pixels / parameters.correlated_depth)
+    of_depth = np.float32(parameters.correlated_gray / parameters.correlated_depth)
     both = photometric + np.where(z_1 > 0, 1 + of_depth * (geometric - 1), np.float32(1))
     lost = np.isnan(both)
     total = np.bincount(keyframe.owner, np.where(lost, EXPECTED, both), keyframe.count)

@@ -89,7 +89,7 @@ def search_motions(
     """
     keyframe = compared.keyframe
     search = _Search(compared, above, divisions, gain_min, parameters, likelihood, np.empty((0, 4, 4)))
-    asked = search.costs.witnesses > likelihood.correlated_pixels
+    asked = search.costs.witnesses > likelihood.correlated_gray
     tried = np.zeros(keyframe.count, bool)
     pixels_min = area_min * keyframe.pixels_per_metre**2
     for _ in range(parameters.rounds):
@@ -260,7 +260,7 @@ class _Search:
             own = self._costs(motion)
             results.append((self._gain(own), motion, own))
         # Gains end where noise begins; among those that are alike the patch itself tells.
-        weight = self.costs.witnesses * patch / (2 * self._likelihood.correlated_pixels)
+        weight = self.costs.witnesses * patch / (2 * self._likelihood.correlated_gray)
         return max(results, key=lambda r: r[0] - float(weight @ r[2].misfit[0]), default=None)
 
     def _differs(self, motion: NDArray, patch: NDArray[np.bool_]) -> bool:

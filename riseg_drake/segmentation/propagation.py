@@ -28,6 +28,9 @@ _DEPTH_AGREES = 0.008
 _REACH = 0.005
 """m; how far from its surroundings a pixel may take its label, where it has none of its own."""
 
+_CLOSE = 5
+"""Pixels; smaller gaps between points of one thing are closed."""
+
 
 def carry_labels(
     pair: FramePair,
@@ -87,21 +90,25 @@ def draw_labels(
     drawn = np.zeros_like(label_0)
     nearest = np.full(label_0.shape, np.inf, np.float32)
     X_C1C0 = inverse(current.X_WC) @ reference.X_WC
-    v, u = np.nonzero((label_0 > 0) & (reference.depth > 0))
-    p_C0Q = rays(reference.intrinsics)[v, u].astype(float) * reference.depth[v, u][:, None]
-    owner = label_0[v, u]
-    for a in np.unique(owner):
+    shown = (label_0 > 0) & (reference.depth > 0)
+    p_C0Q = rays(reference.intrinsics)[shown].astype(float) * reference.depth[shown][:, None]
+    owner = label_0[shown]
+    for a in np.flatnonzero(np.bincount(owner)):
         p_C1Q = move_points(X_C1C0 @ motion_of.get(int(a), np.eye(4)), p_C0Q[owner == a])
         (row, column), inside = (x.T for x in pixels_of(p_C1Q, current.intrinsics))
+        if not inside.any():
+            continue
         row, column, z = row[inside], column[inside], p_C1Q[inside, 2].astype(np.float32)
-        spots = np.zeros(drawn.shape, np.float32)
-        spots[row, column] = 1 / z
+        top, left = (max(0, int(x.min()) - _CLOSE) for x in (row, column))
+        region = np.s_[top : int(row.max()) + _CLOSE + 1, left : int(column.max()) + _CLOSE + 1]
+        spots = np.zeros(drawn[region].shape, np.float32)
+        spots[row - top, column - left] = 1 / z
         # Nearer than it was, a thing is larger: its points leave gaps.
-        spots = cv2.morphologyEx(spots, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
+        spots = cv2.morphologyEx(spots, cv2.MORPH_CLOSE, np.ones((_CLOSE, _CLOSE), np.uint8))
         with np.errstate(divide="ignore"):
             z_1 = 1 / spots
-        front = (spots > 0) & (z_1 < nearest)
-        drawn[front], nearest[front] = a, z_1[front]
+        front = (spots > 0) & (z_1 < nearest[region])
+        drawn[region][front], nearest[region][front] = a, z_1[front]
     return drawn
 
 

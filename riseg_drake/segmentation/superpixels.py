@@ -1,12 +1,13 @@
 """Small pieces of an image that follow its edges: the pixels of a blank surface decide together."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.nearest import nearest_values
+from riseg_drake.segmentation.occlusion import seen_in_pieces
 
 _HEIGHT_STEPS = 2000.0
 """Gray levels a metre of height is worth beside colour: half a millimetre is one level."""
@@ -23,9 +24,11 @@ class Superpixels:
     count: int
     """N."""
     borders: NDArray[np.intp]
-    """[M, 2], the two pieces of each border, the smaller number first."""
+    """[M, 2], the two pieces of each border, the smaller number first; rising."""
     length: NDArray[np.float64]
     """[M], pixels along each border."""
+    behind: NDArray[np.bool_]
+    """[M], which of them lie behind something: their sides do not touch."""
 
 
 def superpixels(
@@ -80,7 +83,25 @@ def _with_borders(label: NDArray[np.intp], count: int) -> Superpixels:
         low, high = np.minimum(a[touch], b[touch]), np.maximum(a[touch], b[touch])
         length += np.bincount(low * count + high, minlength=size)
     code = np.flatnonzero(length)
-    return Superpixels(label, count, np.stack(np.divmod(code, max(count, 1)), axis=1), length[code])
+    borders = np.stack(np.divmod(code, max(count, 1)), axis=1)
+    return Superpixels(label, count, borders, length[code], np.zeros(len(code), bool))
+
+
+def with_occlusions(cut: Superpixels, height: NDArray[np.float32], level: float) -> Superpixels:
+    """The superpixels, with borders between those that may be one behind what is in front of them.
+
+    `height` [H, W], m above the table; surfaces on both sides are as high as each other within `level`, m.
+    """
+    pairs, width = seen_in_pieces(cut.label, height, level)
+    code, touching = (p[:, 0] * cut.count + p[:, 1] for p in (pairs, cut.borders))
+    new = ~np.isin(code, touching)
+    order = np.argsort(np.concatenate([touching, code[new]]), kind="stable")
+    return replace(
+        cut,
+        borders=np.concatenate([cut.borders, pairs[new]])[order],
+        length=np.concatenate([cut.length, width[new]])[order],
+        behind=np.concatenate([cut.behind, np.ones(np.count_nonzero(new), bool)])[order],
+    )
 
 
 def split_superpixels(cut: Superpixels, bodies: NDArray[np.integer]) -> Superpixels:

@@ -36,11 +36,11 @@ def costs(keyframe: Keyframe, frame: Frame, **parameters: float) -> np.ndarray:
     return misfit[np.bincount(keyframe.owner, minlength=keyframe.count) > 0]
 
 
-def test_depth_counts_by_how_many_pixels_its_noise_is_alike_in(plate: tuple[Keyframe, Frame]) -> None:
+def test_depth_counts_by_how_many_witnesses_its_noise_is_alike_in(plate: tuple[Keyframe, Frame]) -> None:
     keyframe, frame = plate
     # Two standard deviations of the difference of two depths: squared residuals of 4.
     nearer = replace(frame, depth=frame.depth - np.float32(2 * np.sqrt(2) * DEPTH_NOISE) * frame.depth**2)
-    for correlated, expected in ((6.0, 4.0), (12.0, 1 + 3 / 2), (28.0, 1 + 3 * 6 / 28)):
+    for correlated, expected in ((3.0, 4.0), (6.0, 1 + 3 / 2), (14.0, 1 + 3 * 3 / 14)):
         # The spread is that at the depth which is expected; gray has no residual.
         np.testing.assert_allclose(costs(keyframe, nearer, correlated_depth=correlated), expected, rtol=1e-3)
 
@@ -55,13 +55,13 @@ def test_light_has_one_price_a_superpixel(plate: tuple[Keyframe, Frame]) -> None
     brighter = replace(frame, color=np.full_like(frame.color, 132))
     witnesses = np.bincount(keyframe.owner, minlength=keyframe.count)
     witnesses = witnesses[witnesses > 0]
-    # 120 to 132: minimise n (132 - 120 f)^2 / 8 + c (f - 1)^2 over f, with c = 6 / 0.02^2 where nothing moves.
-    c = 6 / 0.02**2
+    # 120 to 132: minimise n (132 - 120 f)^2 / 8 + c (f - 1)^2 over f, with c = 3 / 0.02^2 where nothing moves.
+    c = 3 / 0.02**2
     f = (witnesses * 120 * 132 / 8 + c) / (witnesses * 120**2 / 8 + c)
-    # Depth's residual is 0 and its share of a pixel's cost 6 / 28.
-    expected = (132 - 120 * f) ** 2 / 8 / f**2 + c * (f - 1) ** 2 / witnesses + 1 - 6 / 28
+    # Depth's residual is 0 and its share of a pixel's cost 3 / 14.
+    expected = (132 - 120 * f) ** 2 / 8 / f**2 + c * (f - 1) ** 2 / witnesses + 1 - 3 / 14
     # In the old light it would be 18 a pixel, of which 9 count: for the smallest superpixels that is less.
-    np.testing.assert_allclose(costs(keyframe, brighter), np.minimum(expected, 9 + 1 - 6 / 28), rtol=0.02)
+    np.testing.assert_allclose(costs(keyframe, brighter), np.minimum(expected, 9 + 1 - 3 / 14), rtol=0.02)
 
 
 @pytest.mark.parametrize("measured", [0.97, 1.0, 1.03, 0.9])
@@ -71,8 +71,8 @@ def test_what_stands_still_may_be_nearer_or_farther_than_measured_in_both_views(
     near, aside = (replace(f, depth=f.depth * np.float32(measured)) for f in frames)
     above = standing(near, near.depth < measured * 0.44)
     keyframe = make_keyframe(near, above, MeasurementNoise(), KeyframeParameters())
-    # Gray and depth as they should be: 0 and 1 - 6 / 28, and a little for interpolation.
-    right = pytest.approx(1 - 6 / 28, abs=0.02)
+    # Gray and depth as they should be: 0 and 1 - 3 / 14, and a little for interpolation.
+    right = pytest.approx(1 - 3 / 14, abs=0.02)
     # 6 cm aside are 44 pixels; 3 % of them are a motion of 1.3.
     assert bool(np.median(costs(keyframe, aside, view_errors=0.0)) == right) is (measured == 1)
     # Three errors of 1 % are allowed, and 10 % are not.
@@ -85,8 +85,8 @@ def test_a_camera_that_stands_shows_nothing_of_how_depth_errs(plate: tuple[Keyfr
 
 
 def test_nats_are_squared_residuals_by_what_is_usual_and_no_more_than_a_superpixel_may_say() -> None:
-    # 24 pixels count as 4, half of each squared residual; what is usual is 2, up to 3 may be by chance.
-    misfit, witnesses = np.array([[2.0, 2.0, 3.5], [2.5, 4.0, 2.0]]), np.array([24.0, 24.0, 24.0])
+    # 12 witnesses count as 4, half of each squared residual; what is usual is 2, up to 3 may be by chance.
+    misfit, witnesses = np.array([[2.0, 2.0, 3.5], [2.5, 4.0, 2.0]]), np.array([12.0, 12.0, 12.0])
     seen = np.zeros((2, 3))
     nats = Costs(misfit, witnesses, seen).nats(LikelihoodParameters())
     np.testing.assert_allclose(nats, [[0, 0, 0.5 * 2], [0, 1.0 * 2, 0]])
@@ -96,16 +96,16 @@ def test_nats_are_squared_residuals_by_what_is_usual_and_no_more_than_a_superpix
 
 def test_excess_is_what_no_motion_explains_beyond_what_may_be_by_chance() -> None:
     # As above, but against a motion that is right; the third is explained by neither, the fourth says too much.
-    misfit, witnesses = np.array([[2.0, 2.0, 5.0, 18.0], [2.5, 4.0, 4.0, 2.0]]), np.full(4, 24.0)
+    misfit, witnesses = np.array([[2.0, 2.0, 5.0, 18.0], [2.5, 4.0, 4.0, 2.0]]), np.full(4, 12.0)
     excess = Costs(misfit, witnesses, np.zeros((2, 4))).excess(LikelihoodParameters())
     np.testing.assert_allclose(excess, [[0, 0, 2.0 * 2, 4], [0, 1.0 * 2, 1.0 * 2, 0]])
 
 
 def test_what_a_motion_hides_is_no_match_but_worse_by_what_is_usual() -> None:
-    # The second motion hides half of it. What is usual is 2: half of that, for 24 pixels that count as 4.
-    misfit, witnesses = np.array([[2.5], [2.0]]), np.array([24.0])
+    # The second motion hides half of it. What is usual is 2: half of that, for 12 witnesses that count as 4.
+    misfit, witnesses = np.array([[2.5], [2.0]]), np.array([12.0])
     nats = Costs(misfit, witnesses, np.array([[0.0], [0.5]])).nats(LikelihoodParameters())
-    np.testing.assert_allclose(nats, [[0], [0.5 * 2 * 24 / 6 / 2]])
+    np.testing.assert_allclose(nats, [[0], [0.5 * 2 * 12 / 3 / 2]])
     without = Costs(misfit, witnesses, np.array([[0.0], [0.5]])).nats(LikelihoodParameters(hidden=0.0))
     np.testing.assert_array_equal(without, [[0], [0]])
 

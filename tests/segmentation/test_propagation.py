@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from riseg_drake.geometry.rgbd import FramePair
-from riseg_drake.segmentation.propagation import UNKNOWN, carry_labels, nearest_label
+from riseg_drake.segmentation.propagation import UNKNOWN, carry_labels, draw_labels, nearest_label
 from tests.segmentation.drawn_scene import (
     CAMERA,
     DrawnScene,
@@ -44,6 +44,31 @@ def test_labels_land_where_the_bodies_are(camera, seed) -> None:
     assert not out[label_1 == 0].any()
     for number in (1, 2, 3):
         assert intersection_over_union(out == number, label_1 == number) > 0.97
+
+
+def test_labels_are_drawn_without_gaps_where_a_nearer_camera_measures_nothing() -> None:
+    there = [move(PLACES[0], 0.006, 0.012, 0.1), *PLACES[1:]]
+    pair, label_0, label_1 = DrawnScene(SIZES).pair((looking_down(), looking_down(z=0.3)), (PLACES, there))
+    motions = {1: motion_seen_from(pair.reference.X_WC, PLACES[0], there[0])}
+    out = draw_labels(pair.reference, pair.current, label_0, motions)
+    for number in (1, 2, 3):
+        assert intersection_over_union(out == number, label_1 == number) > 0.95
+
+
+def test_of_what_is_drawn_the_nearest_is_seen_and_what_is_behind_the_camera_is_not() -> None:
+    frame, label = DrawnScene(SIZES).frame(0, looking_down(), PLACES)
+
+    def drawn(p_C: list[float]) -> np.ndarray:
+        motion = np.eye(4)
+        motion[:3, 3] = p_C
+        return draw_labels(frame, frame, label, {1: motion})
+
+    onto_2 = PLACES[1][:2, 3] - PLACES[0][:2, 3]
+    for dz, visible in ((-0.1, True), (0.1, False)):  # C looks down, so y is turned
+        covered = drawn([onto_2[0], -onto_2[1], dz])[label == 2]
+        assert bool(np.mean(covered == 1) > 0.5) is visible
+        assert np.isin(covered, (1, 2)).all()
+    assert not (drawn([0, 0, -1.0]) == 1).any()
 
 
 def test_every_pixel_above_the_table_has_a_label_and_no_other() -> None:
