@@ -24,7 +24,7 @@ def strips(heights: list[float], rows: int = 20) -> tuple[np.ndarray, np.ndarray
         ([0.02, 0.05, 0.031], [[0, 2]]),  # within 12 mm
         ([0.02, 0.05, 0.033], []),
         ([0.033, 0.05, 0.02], []),
-        ([0.02, 0.023, 0.02], []),  # nothing is in front
+        ([0.02, 0.023, 0.018], []),  # nothing is in front
         ([0.05, 0.02, 0.05], []),  # a gap
         ([0.02, 0.05, -1, 0.05, 0.02], []),  # the table is seen between
         ([0.02, 0.04, 0.06, 0.04, 0.02], [[0, 4], [1, 3]]),
@@ -48,6 +48,11 @@ def test_a_turned_or_mirrored_picture_has_the_same_pairs() -> None:
         other, same = seen_in_pieces(turn(label).copy(), turn(height).copy(), LEVEL)
         np.testing.assert_array_equal(other, pairs)
         np.testing.assert_array_equal(same, width)
+
+
+def test_a_superpixel_on_both_sides_has_no_border_with_itself() -> None:
+    label, height = strips([0.02, 0.05, 0.02])
+    assert len(seen_in_pieces(np.where(label == 2, 0, label), height, LEVEL)[0]) == 0
 
 
 def test_no_two_surfaces_are_on_one_level_if_none_is_asked_for() -> None:
