@@ -14,7 +14,7 @@ from riseg_drake.learned.sam import SamParameters, load_sam
 from riseg_drake.systems.arm_motion import ArmMotion
 from riseg_drake.systems.mask_refiner import MaskRefiner, Refinement
 
-REFINER_OFFSET = MASK_OFFSET + 0.0005
+REFINER_OFFSET = MASK_OFFSET + 0.0002
 """The refiner looks this long after the camera's tick, s: once L_t is made."""
 
 

@@ -17,10 +17,10 @@ from riseg_drake.systems.mask_propagator import MaskPropagator
 from riseg_drake.systems.objects_above_table import ObjectsAboveTable
 from riseg_drake.systems.optical_flow import OpticalFlow
 
-FRAME_OFFSET = 0.001
-"""A frame is taken in this long after the camera's tick, s: at the tick one would get the frame before.
-Less than a simulation step, so that the joint angles are those of the picture."""
-MASK_OFFSET = 0.0015
+FRAME_OFFSET = 0.0004
+"""A frame is taken in this long after the camera's tick, s: later than PICTURE_DELAY, lest it be the picture
+before with the joint angles of now, and earlier than the simulation's next step, which changes these."""
+MASK_OFFSET = 0.0006
 """L_t is made this long after the camera's tick, s: once the frame is in memory."""
 
 STATION_PORTS = {

@@ -46,6 +46,8 @@ from riseg_drake.stations.scene import SceneConfig, make_scene
 from riseg_drake.stations.wrist_camera import CameraConfig, ObjectLabels, WristCamera
 
 RENDERER = "renderer"
+PICTURE_DELAY = 2e-4
+"""s, at most, from the camera's tick to its picture. Joint angles read before the next step are those of it."""
 CLIPPING = (0.01, 10.0)  # m; what the renderer draws, wider than what the sensor measures
 
 
@@ -82,7 +84,7 @@ class SimulatedStationConfig:
     table: TableConfig = field(default_factory=TableConfig)
     renderer: RenderEngineVtkParams = field(default_factory=soft_light)
     """Lights, shadows and background of the camera's pictures."""
-    time_step: float = 0.002
+    time_step: float = field(default=0.002, metadata={"least": 0.0005, "most": 0.02})
     """Longest step of the simulation, s; shortened so that a whole number of steps makes a picture."""
     stiffness: float = 2000.0
     """Proportional gain of every joint's controller, N m / rad."""
@@ -222,9 +224,9 @@ class SimulatedStation(Diagram):
     ) -> None:
         k = config
         sensor = builder.AddNamedSystem("ideal_camera", ideal_camera(self.plant, frame, k))
-        # A quarter of a step after the plant's own: joint angles read within the millisecond after that
-        # are those of the picture.
-        camera = builder.AddNamedSystem("wrist_camera", WristCamera(k, seed, 1 / k.rate, step / 4))
+        # After the plant's own step, and never when its picture is looked for.
+        delay = min(PICTURE_DELAY, step / 4)
+        camera = builder.AddNamedSystem("wrist_camera", WristCamera(k, seed, 1 / k.rate, delay))
         labels = builder.AddNamedSystem("labels", ObjectLabels(k, object_id_table(self.object_bodies)))
         builder.Connect(self.scene_graph.get_query_output_port(), sensor.query_object_input_port())
         builder.Connect(sensor.color_image_output_port(), camera.GetInputPort("color_image"))
