@@ -65,48 +65,60 @@ _GROWTH = (1.0, 1.4, 4.0, 50.0)
 """Radii, in those of a patch, within which a motion is sharpened in turn."""
 
 
-def search_motions(
-    compared: Comparison,
-    above: AboveTable,
-    divisions: NDArray[np.intp],
-    proposed_K: NDArray[np.float64],
-    gain_min: float,
-    parameters: MotionSearchParameters,
-    likelihood: LikelihoodParameters,
-    area_min: float,
-) -> NDArray[np.float64]:
-    """Motions [C, 4, 4] in the keyframe's camera that explain what standing still does not.
+@dataclass(frozen=True)
+class SearchProblem:
+    """A frame in which motions of a keyframe's bodies are looked for."""
 
-    Args:
-        compared: the keyframe, at the rest before, and the frame, at the rest after.
-        above: objMask of that frame.
-        divisions: [L, N], 0.., ways to tell which superpixels are one body.
-        proposed_K: [G, 4, 4], what was seen in motion; taken where it explains what nothing found does.
-        gain_min: nats that a motion must bring.
-        parameters: see there.
-        likelihood: see there.
-        area_min: m^2; what is large enough for a body.
+    compared: Comparison
+    """The keyframe, at the rest before, and the frame."""
+    above: AboveTable
+    """objMask of that frame."""
+    divisions: NDArray[np.intp]
+    """[L, N], 0.., ways to tell which superpixels are one body."""
+    gain_min: float
+    """Nats that a motion must bring."""
+    parameters: MotionSearchParameters
+    likelihood: LikelihoodParameters
+    area_min: float
+    """m^2; what is large enough for a body."""
+
+    def possible_bodies(self) -> NDArray[np.bool_]:
+        """[B, N], the parts of all divisions that are as large as a body, each once."""
+        area = self.compared.keyframe.area
+        parts = [part == p for part in self.divisions for p in range(int(part.max(initial=-1)) + 1)]
+        large = [part for part in parts if area[part].sum() >= self.pixels_min]
+        return np.unique(np.array(large).reshape(-1, len(area)), axis=0)
+
+    @property
+    def pixels_min(self) -> float:
+        """Pixels of what is large enough for a body."""
+        return self.area_min * self.compared.keyframe.pixels_per_metre**2
+
+
+def search_motions(problem: SearchProblem, proposed_K: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Motions [C, 4, 4] in the keyframe's camera that explain, from rest to rest, what standing still does not.
+
+    Those `proposed_K` [G, 4, 4], seen in motion, are taken where they explain what nothing found does.
     """
-    keyframe = compared.keyframe
-    search = _Search(compared, above, divisions, gain_min, parameters, likelihood, np.empty((0, 4, 4)))
+    keyframe, parameters, likelihood = problem.compared.keyframe, problem.parameters, problem.likelihood
+    search = _Search(problem, np.empty((0, 4, 4)))
     asked = search.costs.witnesses > likelihood.correlated_gray
     tried = np.zeros(keyframe.count, bool)
-    pixels_min = area_min * keyframe.pixels_per_metre**2
     for _ in range(parameters.rounds):
         unexplained = (search.costs.misfit.min(0) > parameters.unexplained) & asked
         patch, distance = search.densest_patch(unexplained & ~tried)
-        if keyframe.area[patch].sum() < 0.2 * pixels_min:
+        if keyframe.area[patch].sum() < 0.2 * problem.pixels_min:
             break
         tried |= patch & unexplained
         if search.take(search.best_motion(patch, distance), patch):
             # What it did not explain may be tried with other neighbours.
             tried &= search.costs.misfit.min(0) > parameters.unexplained
     # Each superpixel of a blank body may be explained, by one motion or another, all of it by none.
-    bodies = _possible_bodies(divisions, keyframe.area, pixels_min)
+    bodies = problem.possible_bodies()
     while len(bodies):
         short = (bodies @ search.costs.nats(likelihood).T).min(1)
         worst = int(short.argmax())
-        if short[worst] < gain_min:
+        if short[worst] < problem.gain_min:
             break
         body, bodies = bodies[worst], np.delete(bodies, worst, axis=0)
         search.take(search.best_motion(body, np.where(body, 0.0, np.inf)), body)
@@ -115,30 +127,20 @@ def search_motions(
     return np.array(search.found).reshape(-1, 4, 4)
 
 
-def missing_motion(
-    compared: Comparison,
-    above: AboveTable,
-    divisions: NDArray[np.intp],
-    known_K: NDArray[np.float64],
-    gain_min: float,
-    parameters: MotionSearchParameters,
-    likelihood: LikelihoodParameters,
-    area_min: float,
-) -> NDArray[np.float64]:
+def missing_motion(problem: SearchProblem, known_K: NDArray[np.float64]) -> NDArray[np.float64]:
     """The one motion [0 or 1, 4, 4] that is missed most beside standing still and known ones [G, 4, 4].
 
-    For a frame in motion, of which there are many: one body, of `area_min` m^2 or more, is asked about, with
-    few points, and the best valley alone is gone down. The motion must explain most of what is missed there,
-    `gain_min` nats at least. The parameters are those of `search_motions`.
+    For a frame in motion, of which there are many: one body is asked about, with few points, and the best
+    valley alone is gone down. The motion must explain most of what is missed there, `gain_min` nats at least.
     """
-    keyframe = compared.keyframe
-    bodies = _possible_bodies(divisions, keyframe.area, area_min * keyframe.pixels_per_metre**2)
+    keyframe, parameters, likelihood = problem.compared.keyframe, problem.parameters, problem.likelihood
+    gain_min, bodies = problem.gain_min, problem.possible_bodies()
     if not len(bodies):
         return np.empty((0, 4, 4))
     # What moves less far than the grid's step will be seen at the next rest; poses err by as much.
     least = parameters.step * keyframe.pixels_per_metre
     quick = replace(parameters, best=1, samples=parameters.samples // 3, same_flow=least)
-    search = _Search(compared, above, divisions, gain_min, quick, likelihood, known_K)
+    search = _Search(replace(problem, parameters=quick), known_K)
     missed = _missed(bodies, search.costs, likelihood)
     # More than a motion's price, for its size: not a sliver, and not a heap of which one thing moves.
     worst = int(((missed - gain_min) / (bodies @ keyframe.area)).argmax())
@@ -168,37 +170,20 @@ def unexplained_parts(nats: NDArray[np.float64], part: NDArray[np.intp]) -> NDAr
     return np.min([np.bincount(part, n, count) for n in nats], axis=0)
 
 
-def _possible_bodies(divisions: NDArray[np.intp], area: NDArray[np.intp], area_min: float) -> NDArray[np.bool_]:
-    """[B, N], the parts of all divisions [L, N] that are as large as a body, each once."""
-    parts = [part == p for part in divisions for p in range(int(part.max(initial=-1)) + 1)]
-    large = [part for part in parts if area[part].sum() >= area_min]
-    return np.unique(np.array(large).reshape(-1, len(area)), axis=0)
-
-
 class _Search:
     """A keyframe and a frame, prepared for many motions, and those that were found."""
 
-    def __init__(
-        self,
-        compared: Comparison,
-        above: AboveTable,
-        divisions: NDArray[np.intp],
-        gain_min: float,
-        parameters: MotionSearchParameters,
-        likelihood: LikelihoodParameters,
-        known_K: NDArray[np.float64],
-    ):
-        self._compared = compared
+    def __init__(self, problem: SearchProblem, known_K: NDArray[np.float64]):
+        compared = self._compared = problem.compared
         self._keyframe, self._frame = compared.keyframe, compared.frame
-        self._above = above
-        self._divisions, self._gain_min = divisions, gain_min
-        self._parameters, self._likelihood = parameters, likelihood
+        self._above, self._divisions, self._gain_min = problem.above, problem.divisions, problem.gain_min
+        self._parameters, self._likelihood = problem.parameters, problem.likelihood
         self._fit = rigid_fit(compared.pair, compared.depth_noise)
         self._rng = np.random.default_rng(compared.keyframe.frame.sequence)
         self._normal = compared.keyframe.frame.X_WC[:3, :3].T @ compared.keyframe.above.plane_W[:3]
         self.found: list[NDArray] = list(known_K)
         """Motions [4, 4]."""
-        self.costs = motion_costs(compared, np.concatenate([np.eye(4)[None], known_K]), likelihood)
+        self.costs = motion_costs(compared, np.concatenate([np.eye(4)[None], known_K]), problem.likelihood)
         """Of standing still, and of those."""
 
     # In motion most looks end with the costs above: what follows is made when it is asked for.

@@ -6,7 +6,6 @@ pictures are sharp, have depth, and span all that happened: that pair decides, i
 second frame becomes the keyframe.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import cv2
@@ -33,7 +32,12 @@ from riseg_drake.segmentation.candidates import candidate_motions
 from riseg_drake.segmentation.comparison import Comparison, renewed_view_error
 from riseg_drake.segmentation.frame_pairs import camera_span
 from riseg_drake.segmentation.memory import Memory, draw_memory, moved_memory, remember
-from riseg_drake.segmentation.motion_search import MotionSearchParameters, missing_motion, search_motions
+from riseg_drake.segmentation.motion_search import (
+    MotionSearchParameters,
+    SearchProblem,
+    missing_motion,
+    search_motions,
+)
 from riseg_drake.segmentation.motions import BFIFGroups
 from riseg_drake.segmentation.observation import Observation, ObservationParameters, observe
 from riseg_drake.segmentation.partition import margins
@@ -118,13 +122,13 @@ def segment_by_evidence(
     )
     if not deciding and now.still_since is None and frame.time - now.searched >= parameters.search_every:
         now = replace(now, searched=frame.time)
-        missing_K = _sought(missing_motion, belief, compared, above_1, candidates_K, parameters)
+        missing_K = missing_motion(_problem(belief, compared, above_1, parameters), candidates_K)
         candidates_K = np.concatenate([candidates_K, missing_K])
     if len(candidates_K) and not deciding:
         seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters)
         deciding = _has_gone_far(now, frame, seen, bodies, parameters)
     if deciding:
-        candidates_K = _sought(search_motions, belief, compared, above_1, candidates_K, parameters)
+        candidates_K = search_motions(_problem(belief, compared, above_1, parameters), candidates_K)
         if len(candidates_K):
             at_rest = now.still_since is not None
             seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters, at_rest=at_rest)
@@ -179,20 +183,13 @@ def _explained(
     return bodies_of(belief, seen, before, parameters.belief, at_rest=at_rest)
 
 
-def _sought(
-    search: Callable[..., NDArray[np.float64]],
-    belief: Belief,
-    compared: Comparison,
-    above: AboveTable,
-    candidates_K: NDArray[np.float64],
-    parameters: EvidenceParameters,
-) -> NDArray[np.float64]:
-    """Motions [C, 4, 4] that explain a frame, by one of the functions of `motion_search`."""
-    return search(
+def _problem(
+    belief: Belief, compared: Comparison, above: AboveTable, parameters: EvidenceParameters
+) -> SearchProblem:
+    return SearchProblem(
         compared,
         above,
         np.vstack([belief.part[None], belief.finer]),
-        candidates_K,
         parameters.observation.motion_cost,
         parameters.search,
         parameters.observation.likelihood,

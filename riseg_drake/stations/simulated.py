@@ -47,7 +47,8 @@ from riseg_drake.stations.wrist_camera import CameraConfig, ObjectLabels, WristC
 
 RENDERER = "renderer"
 PICTURE_DELAY = 2e-4
-"""s, at most, from the camera's tick to its picture. Joint angles read before the next step are those of it."""
+"""s from the camera's tick, and a step of the plant, to its picture: less than any step, so that joint angles
+read before the next one are those of it."""
 CLIPPING = (0.01, 10.0)  # m; what the renderer draws, wider than what the sensor measures
 
 
@@ -202,7 +203,7 @@ class SimulatedStation(Diagram):
 
         self._wire_arm(builder, panda.arm, step)
         scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(config.renderer))
-        self._wire_camera(builder, panda.camera_frame, config.camera, seed, step)
+        self._wire_camera(builder, panda.camera_frame, config.camera, seed)
         builder.ExportOutput(plant.get_body_poses_output_port(), "cheat.body_poses")
         if meshcat is not None:
             MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
@@ -219,14 +220,10 @@ class SimulatedStation(Diagram):
         builder.ExportOutput(split.get_output_port(0), "panda.position_measured")
         builder.ExportOutput(split.get_output_port(1), "panda.velocity_measured")
 
-    def _wire_camera(
-        self, builder: DiagramBuilder, frame: Frame, config: CameraConfig, seed: int, step: float
-    ) -> None:
+    def _wire_camera(self, builder: DiagramBuilder, frame: Frame, config: CameraConfig, seed: int) -> None:
         k = config
         sensor = builder.AddNamedSystem("ideal_camera", ideal_camera(self.plant, frame, k))
-        # After the plant's own step, and never when its picture is looked for.
-        delay = min(PICTURE_DELAY, step / 4)
-        camera = builder.AddNamedSystem("wrist_camera", WristCamera(k, seed, 1 / k.rate, delay))
+        camera = builder.AddNamedSystem("wrist_camera", WristCamera(k, seed, 1 / k.rate, PICTURE_DELAY))
         labels = builder.AddNamedSystem("labels", ObjectLabels(k, object_id_table(self.object_bodies)))
         builder.Connect(self.scene_graph.get_query_output_port(), sensor.query_object_input_port())
         builder.Connect(sensor.color_image_output_port(), camera.GetInputPort("color_image"))

@@ -8,6 +8,7 @@ from riseg_drake.segmentation.belief import BeliefParameters, first_belief
 from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.motion_search import (
     MotionSearchParameters,
+    SearchProblem,
     missing_motion,
     search_motions,
     unexplained_parts,
@@ -63,16 +64,16 @@ class Moved:
 
     def search(self, *proposed: np.ndarray, search=search_motions) -> np.ndarray:
         parameters = ObservationParameters()
-        return search(
+        problem = SearchProblem(
             self.compared,
             self.above,
             np.vstack([self.belief.part[None], self.belief.finer]),
-            np.array(proposed).reshape(-1, 4, 4),
             parameters.motion_cost,
             MotionSearchParameters(),
             parameters.likelihood,
             BeliefParameters().partition.area_min,
         )
+        return search(problem, np.array(proposed).reshape(-1, 4, 4))
 
     def error(self, k: int, found: np.ndarray) -> float:
         """Pixels by which the nearest found motion is wrong on a box."""
