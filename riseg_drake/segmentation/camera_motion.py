@@ -157,14 +157,16 @@ def settled_pair(
         apart = uv_1[judges] - project(move_points(X_C1C0, p_C0Q[judges]), intrinsics)
         return float(np.quantile(np.abs(apart), still) / norm.ppf(0.5 + still / 2))
 
-    as_given = residual(pair.X_C1C0)
+    tried = [pair.X_C1C0]
     for believed in (change, None) if same_plane else (None,):
         V = _fit(p_C0Q, uv_1, residual_sigma, pair, believed, (sigma_R, sigma_p), parameters)
-        X_C1C0 = exp_se3(V) @ pair.X_C1C0
-        if (now := residual(X_C1C0)) < as_given:
-            current = replace(pair.current, X_WC=pair.reference.X_WC @ inverse(X_C1C0))
-            return replace(pair, current=current, residual=now)
-    return replace(pair, residual=as_given)
+        tried.append(exp_se3(V) @ pair.X_C1C0)
+    left = [residual(X_C1C0) for X_C1C0 in tried]
+    best = int(np.argmin(left))
+    current = pair.current
+    if best > 0:
+        current = replace(current, X_WC=pair.reference.X_WC @ inverse(tried[best]))
+    return replace(pair, current=current, residual=left[best])
 
 
 def _points(

@@ -84,6 +84,18 @@ def test_a_table_that_tilts_with_the_depth_does_not_turn_the_camera(table) -> No
     assert 0 < settled.residual < 0.3
 
 
+def test_where_a_tilted_table_helps_but_less_than_the_images_it_is_not_believed() -> None:
+    pair, flow, above, X_true = pair_with_error(Texture(9, contrast=10), small_error())
+    settled = []
+    for angle in (0.003, 0.004):
+        tilt = Rotation.from_rotvec([angle, -angle, 0]).as_matrix()
+        plane_W = np.append(tilt @ above[1].plane_W[:3], above[1].plane_W[3] + 0.0005)
+        tilted = replace(above[1], plane_W=plane_W)
+        settled.append(settled_pair(pair, flow, above[0], tilted, ERRS, MeasurementNoise(), PARAMETERS))
+    np.testing.assert_array_equal(settled[0].X_C1C0, settled[1].X_C1C0)
+    assert pixels(settled[0].X_C1C0 @ inverse(X_true)) < 0.05
+
+
 def test_the_motion_is_set_right_no_further_than_poses_may_err() -> None:
     far = np.eye(4)
     far[:3, 3] = [0.02, 0, 0]
