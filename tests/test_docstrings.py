@@ -19,7 +19,7 @@ PACKAGE = Path(__file__).parents[1] / "riseg_drake"
 SHAPE = re.compile(r"\[[^\]]+\]")
 UNIT = re.compile(
     r"(?<!\w)(m|mm|s|ms|rad|px|Hz|N|kg|MB|%|m\^2|m/s|rad/s|metres?|seconds?|milliseconds|pixels?|degrees|radians"
-    r"|percent|standard deviations|levels|shares?|ratio|times|probability|in \[0, 1\])(?!\w)",
+    r"|percent|nats|standard deviations|levels|shares?|ratio|times|probability|in \[0, 1\])(?!\w)",
     re.IGNORECASE,
 )
 """Of a length, a time, an angle ..., or of a number that has none."""

@@ -42,8 +42,9 @@ class LikelihoodParameters:
     """Times the mean squared residual that is usual, up to which a superpixel's may be by chance."""
     view_error: float = 0.01
     """The least that is thought of the view's error, see `Comparison`."""
-    view_errors: float = 3.0
-    """So many times that depth may err, and what stands still may seem to have moved, at most."""
+    view_errors: float = 5.0
+    """So many times that depth may err, and what stands still may seem to have moved, at most: real errors have
+    long tails."""
     hidden: float = 1.0
     """Times the mean squared residual that is usual, by which a hidden witness is worse than one that matches:
     few things go just where nobody can see them."""
@@ -103,12 +104,13 @@ def motion_costs(
     """
     keyframe = compared.keyframe
     errs = parameters.view_errors * compared.view_error
-    depth_factors = (1.0, 1 - errs, 1 + errs) if parameters.view_errors * compared.shift > _SEEN else (1.0,)
+    seen = parameters.view_errors * compared.shift > _SEEN
+    depth_factors = 1 + errs * np.array([0.0, -1.0, -0.5, 0.5, 1.0]) if seen else np.ones(1)
     misfit, hidden = np.empty((2, len(motions_K), keyframe.count))
     for k, motion in enumerate(motions_K):
         still = np.array_equal(motion, np.eye(4))
         light = parameters.light_still if still else parameters.light
-        factors = depth_factors if still else (1.0,)
+        factors = depth_factors if still else np.ones(1)
         tries = [_misfit(compared, motion, factor, light, parameters) for factor in factors]
         misfit[k] = np.min([each for each, _ in tries], axis=0)
         hidden[k] = np.maximum(tries[0][1] - compared.leaves, 0)

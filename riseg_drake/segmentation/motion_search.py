@@ -121,7 +121,7 @@ def search_motions(problem: SearchProblem, proposed_K: NDArray[np.float64]) -> N
         if short[worst] < problem.gain_min:
             break
         body, bodies = bodies[worst], np.delete(bodies, worst, axis=0)
-        search.take(search.best_motion(body, np.where(body, 0.0, np.inf)), body)
+        search.take(search.best_motion(body, np.where(body, 0.0, np.inf)), body, distinct=False)
     for motion in proposed_K:
         search.take(search.sharpened(motion), np.zeros(keyframe.count, bool))
     return np.array(search.found).reshape(-1, 4, 4)
@@ -203,10 +203,12 @@ class _Search:
         middle = [np.bincount(label[v, u], x, keyframe.count) / np.maximum(keyframe.area, 1) for x in (v, u)]
         return np.stack(middle, axis=1) / keyframe.pixels_per_metre
 
-    def take(self, motion: tuple[float, NDArray, Costs] | None, patch: NDArray[np.bool_]) -> bool:
+    def take(
+        self, motion: tuple[float, NDArray, Costs] | None, patch: NDArray[np.bool_], *, distinct: bool = True
+    ) -> bool:
         """Add a motion [4, 4], with its gain, nats, and its costs, if it is worth it and takes a patch [N]
-        elsewhere than standing still and the others do."""
-        if motion is None or motion[0] < self._gain_min or not self._differs(motion[1], patch):
+        elsewhere than standing still and the others do, where it is to be `distinct`."""
+        if motion is None or motion[0] < self._gain_min or (distinct and not self._differs(motion[1], patch)):
             return False
         self.found.append(motion[1])
         self.costs = self.costs.with_motion(motion[2])

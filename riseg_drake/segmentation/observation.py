@@ -34,6 +34,9 @@ class ObservationParameters:
     motion_cost: float = 20.0
     """Nats that a motion must explain better than all others do, to be one: five superpixels' worth, as
     errors are common to neighbours."""
+    view_cost: float = 2.0
+    """So much more for each pixel by which what stands still may seem to have moved (`Comparison.shift`): from
+    another view gloss and wrong depth look like a motion over larger patches."""
     along: float = 0.2
     """rho(k | k) of a motion: probability with which a thing pushes its neighbour along as if they were one."""
     stays: float = 0.8
@@ -90,7 +93,8 @@ def observe(
     nats = motion_costs(compared, motions_K, parameters.likelihood).nats(parameters.likelihood)
     moves = _more_than_the_view_errs(compared, motions_K, nats, parameters.likelihood.view_errors)
     motions_K, nats = motions_K[moves], nats[moves]
-    needed, motion = _fewest_motions(nats, keyframe, bond, part, parameters)
+    price = motion_price(compared, parameters)
+    needed, motion = _fewest_motions(nats, keyframe, bond, part, price, parameters)
     nats = nats[needed]
     share = np.bincount(motion, keyframe.area, len(needed)) / max(1, keyframe.area.sum())
     share = np.maximum(share, parameters.outlier)
@@ -106,6 +110,11 @@ def observe(
         evidence=bond_evidence(q, share, keyframe.borders, parameters.stays, parameters.along),
         span=np.array(spans)[motion],
     )
+
+
+def motion_price(compared: Comparison, parameters: ObservationParameters) -> float:
+    """Nats that a motion must explain better than all others do."""
+    return parameters.motion_cost * (1 + parameters.view_cost * compared.shift)
 
 
 def _more_than_the_view_errs(
@@ -161,12 +170,14 @@ def _fewest_motions(
     keyframe: Keyframe,
     bond: NDArray[np.float64],
     part: NDArray[np.intp],
+    price: float,
     parameters: ObservationParameters,
 ) -> tuple[list[int], NDArray[np.intp]]:
     """The motions that are needed, and which of these each superpixel [N] has; drops the others one by one."""
     coupling = parameters.border * np.maximum(bond, parameters.border_least) * keyframe.length
     graph = PottsGraph(keyframe.count, keyframe.borders, coupling)
     needed, message = list(range(len(nats))), None
+    parts = np.array([np.bincount(part, n) for n in nats])
     while True:
         unary = nats[needed].astype(np.float32)
         unary[1:] += np.float32(parameters.still)
@@ -176,8 +187,12 @@ def _fewest_motions(
             mine = nats[np.ix_(needed, motion == k)]
             # All of a part, as far as it has this motion, would have another one.
             without, owner = np.delete(mine, k, axis=0) - mine[k], part[motion == k]
-            gains.append(float(np.min([np.bincount(owner, w) for w in without], axis=0).sum()))
-        if not gains or min(gains) >= parameters.motion_cost:
+            of_labels = float(np.min([np.bincount(owner, w) for w in without], axis=0).sum())
+            # Two other motions may each explain half of a part, and none all of it.
+            with_all = parts[needed]
+            of_parts = float((np.delete(with_all, k, axis=0).min(0) - with_all.min(0)).sum())
+            gains.append(max(of_labels, of_parts))
+        if not gains or min(gains) >= price:
             return needed, motion
         dropped = int(np.argmin(gains)) + 1
         del needed[dropped]

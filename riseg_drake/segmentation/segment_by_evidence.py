@@ -39,11 +39,19 @@ from riseg_drake.segmentation.motion_search import (
     search_motions,
 )
 from riseg_drake.segmentation.motions import BFIFGroups
-from riseg_drake.segmentation.observation import Observation, ObservationParameters, observe
+from riseg_drake.segmentation.observation import (
+    Observation,
+    ObservationParameters,
+    motion_price,
+    observe,
+)
 from riseg_drake.segmentation.partition import margins
 from riseg_drake.segmentation.propagation import UNKNOWN, pixels_of
 from riseg_drake.segmentation.rest import RestParameters, is_still
 from riseg_drake.segmentation.segmentation import Segmentation
+
+_AS_MUCH = 0.5
+"""Share of the area that a keyframe shows, which its successor must show at least."""
 
 
 @dataclass
@@ -132,6 +140,8 @@ def segment_by_evidence(
         if len(candidates_K):
             at_rest = now.still_since is not None
             seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters, at_rest=at_rest)
+        else:
+            bodies = standing(belief)
     return _carried(now, pair, above_1, seen, bodies, deciding, parameters, bfif)
 
 
@@ -190,7 +200,7 @@ def _problem(
         compared,
         above,
         np.vstack([belief.part[None], belief.finer]),
-        parameters.observation.motion_cost,
+        motion_price(compared, parameters.observation),
         parameters.search,
         parameters.observation.likelihood,
         parameters.belief.partition.area_min,
@@ -278,10 +288,12 @@ def _share_in_view(belief: Belief, bodies: Bodies, frame: Frame) -> float:
 def _leaves_keyframe(
     belief: Belief, bodies: Bodies, frame: Frame, above: AboveTable, parameters: EvidenceParameters
 ) -> bool:
-    """Whether too much of what stands there was not to be seen in the keyframe."""
+    """Whether too much of what stands there was not to be seen in the keyframe, which shows hardly more than
+    this frame: a camera that is too near to measure most of it will be back."""
     every = (slice(2, None, 6), slice(2, None, 6))
     standing_there = above.mask[every] & (frame.depth[every] > 0)
-    if not standing_there.any():
+    in_keyframe = belief.keyframe.frame.depth[every][belief.keyframe.above.mask[every]]
+    if (frame.depth[every][standing_there] ** 2).sum() <= _AS_MUCH * (in_keyframe**2).sum():
         return False
     p_C1Q = (rays(frame.intrinsics)[every] * frame.depth[every][..., None])[standing_there].astype(float)
     p_KQ = move_points(inverse(belief.keyframe.frame.X_WC) @ frame.X_WC, p_C1Q)

@@ -64,7 +64,7 @@ def test_light_has_one_price_a_superpixel(plate: tuple[Keyframe, Frame]) -> None
     np.testing.assert_allclose(costs(keyframe, brighter), np.minimum(expected, 9 + 1 - 3 / 14), rtol=0.02)
 
 
-@pytest.mark.parametrize("measured", [0.97, 1.0, 1.03, 0.9])
+@pytest.mark.parametrize("measured", [1 / 1.05, 1 / 1.025, 1.0, 1 / 0.975, 1 / 0.95, 0.9])
 def test_what_stands_still_may_be_nearer_or_farther_than_measured_in_both_views(measured: float) -> None:
     scene = DrawnScene([(0.1, 0.1, 0.03)])
     frames = [scene.frame(n, looking_down(x), [planar(0, 0)])[0] for n, x in enumerate((0.0, 0.06))]
@@ -73,9 +73,9 @@ def test_what_stands_still_may_be_nearer_or_farther_than_measured_in_both_views(
     keyframe = make_keyframe(near, above, MeasurementNoise(), KeyframeParameters())
     # Gray and depth as they should be: 0 and 1 - 3 / 14, and a little for interpolation.
     right = pytest.approx(1 - 3 / 14, abs=0.02)
-    # 6 cm aside are 44 pixels; 3 % of them are a motion of 1.3.
+    # 6 cm aside are 44 pixels; 2.5 % of them are a motion of 1.1.
     assert bool(np.median(costs(keyframe, aside, view_errors=0.0)) == right) is (measured == 1)
-    # Three errors of 1 % are allowed, and 10 % are not.
+    # Five errors of 1 % are allowed, and 10 % are not.
     assert bool(np.median(costs(keyframe, aside)) == right) is (measured != 0.9)
 
 

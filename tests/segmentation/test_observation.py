@@ -1,5 +1,7 @@
 """Which motions there are, and what they say of neighbours, by hand."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -8,8 +10,10 @@ from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.observation import (
     ObservationParameters,
+    _fewest_motions,
     bond_evidence,
     motion_posterior,
+    motion_price,
     observe,
 )
 from tests.segmentation.drawn_scene import DrawnScene, looking_down, motion_seen_from, planar, standing
@@ -83,3 +87,25 @@ def test_a_pixel_and_a_half_are_a_motion_unless_the_view_is_another_one(aside: f
     compared = Comparison(belief.keyframe, pair.current, depth_noise=0.0023, view_error=0.01)
     seen = observe(compared, belief.bond, belief.part, moved, ObservationParameters())
     assert (len(seen.motions_K) == 2) is is_one
+
+
+def test_a_motion_that_alone_explains_all_of_a_part_is_kept_though_two_others_explain_half_of_it_each():
+    """Nats of a chain of 40 superpixels: half of them fit standing still, half another motion, as well."""
+    count, half = 40, np.arange(40) < 20
+    nats = np.array([np.where(half, 0.0, 3.0), np.where(half, 3.0, 0.0), np.full(count, 0.2)])
+    borders = np.column_stack([np.arange(count - 1), np.arange(1, count)])
+    keyframe = SimpleNamespace(count=count, borders=borders, length=np.ones(len(borders)))
+    bond, one = np.full(len(borders), 2.0), np.zeros(count, np.intp)
+    needed, _ = _fewest_motions(nats, keyframe, bond, one, 20.0, ObservationParameters())
+    assert 2 in needed
+    # As two bodies, each has its own motion.
+    two = 1 - half.astype(np.intp)
+    needed, motion = _fewest_motions(nats, keyframe, bond, two, 20.0, ObservationParameters())
+    assert needed == [0, 1]
+    np.testing.assert_array_equal(motion, 1 - half)
+
+
+@pytest.mark.parametrize(("shift", "price"), [(0.0, 20.0), (0.25, 30.0), (1.0, 60.0)])
+def test_a_motion_costs_more_the_more_the_view_has_changed(shift, price):
+    parameters = ObservationParameters(motion_cost=20.0, view_cost=2.0)
+    assert motion_price(SimpleNamespace(shift=shift), parameters) == pytest.approx(price)
