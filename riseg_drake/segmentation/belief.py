@@ -184,15 +184,17 @@ def next_belief(
     if seen is not None:
         evidence = np.clip(evidence + seen.evidence, -parameters.most, parameters.most)
     body = np.where(known, bodies.body[source], _most_seen(new, np.where(carried == 0, ids, 0)))
+    moved = known & (bodies.motion[source] > 0)
     prior = border_prior(new, parameters.prior)
-    evidence = _carried_evidence(old, belief.prior, evidence, new, prior, source, body, parameters)
+    evidence = _carried_evidence(old, belief.prior, evidence, new, prior, source, body, moved, parameters)
+    part = partition(new, prior + evidence, parameters.partition)
     return Belief(
         keyframe=new,
         prior=prior,
         evidence=evidence,
-        body=body,
+        body=_completed(body, known, part, new.area),
         next_id=bodies.next_id,
-        part=partition(new, prior + evidence, parameters.partition),
+        part=part,
         finer=_finer(new, prior + evidence, parameters),
     )
 
@@ -215,6 +217,16 @@ def rebased(then: Bodies, now: Bodies, old: Keyframe, following: Belief) -> Bodi
     return Bodies(following.body, motion, np.array(motions), following.next_id)
 
 
+def _completed(
+    body: NDArray[np.intp], known: NDArray[np.bool_], part: NDArray[np.intp], area: NDArray[np.intp]
+) -> NDArray[np.intp]:
+    """Ids [N], of which those that were not `known` [N] before take that of most of their part."""
+    ids = np.zeros((int(part.max(initial=-1)) + 1, int(body.max(initial=0)) + 1))
+    np.add.at(ids, (part, body), area)
+    most = np.where(2 * ids.max(1) > ids.sum(1), ids.argmax(1), 0)
+    return np.where(known | (body > 0), body, most[part])
+
+
 def _finer(keyframe: Keyframe, bond: NDArray[np.float64], parameters: BeliefParameters) -> NDArray[np.intp]:
     parts = [partition(keyframe, bond - by, parameters.partition) for by in parameters.weaker]
     return np.array(parts, np.intp).reshape(-1, keyframe.count)
@@ -228,9 +240,13 @@ def _carried_evidence(
     new_prior: NDArray[np.float64],
     source: NDArray[np.intp],
     body: NDArray[np.intp],
+    moved: NDArray[np.bool_],
     parameters: BeliefParameters,
 ) -> NDArray[np.float64]:
-    """Evidence [M] for the borders of the new keyframe, whose superpixels come from old ones, `source` [N]."""
+    """Evidence [M] for the borders of the new keyframe, whose superpixels come from old ones, `source` [N].
+
+    What a body uncovered that `moved` [N] away is not that body; of others that stood beside it, it may be.
+    """
     a, b = new.borders.T
     from_a, from_b = source[a], source[b]
     code = np.minimum(from_a, from_b) * old.count + np.maximum(from_a, from_b)
@@ -243,8 +259,11 @@ def _carried_evidence(
         remembered = old_evidence[place] + np.minimum(old_prior[place] - new_prior, 0)
     else:
         same_border, remembered = np.zeros(len(a), bool), np.zeros(len(a))
+    stood = (from_a < 0) & (from_b >= 0) & ~moved[b] | (from_b < 0) & (from_a >= 0) & ~moved[a]
     apart = np.where(
-        body[a] == body[b], np.where(body[a] > 0, parameters.inside / 2, 0), -2 * parameters.inside
+        body[a] == body[b],
+        np.where(body[a] > 0, parameters.inside / 2, 0),
+        np.where(stood, 0, -2 * parameters.inside),
     )
     evidence = np.where(known & (from_a == from_b), parameters.inside, np.where(same_border, remembered, apart))
     return np.where(known | (body[a] > 0) | (body[b] > 0), evidence, 0.0)

@@ -28,6 +28,9 @@ _DEPTH_AGREES = 0.008
 _REACH = 0.005
 """m; how far from its surroundings a pixel may take its label, where it has none of its own."""
 
+_RIM = np.ones((7, 7), np.uint8)
+"""Three pixels on each side of an outline have no depth of their own."""
+
 _CLOSE = 5
 """Pixels; smaller gaps between points of one thing are closed."""
 
@@ -73,7 +76,9 @@ def carry_labels(
     remembered = remembered_1[v, u]
     out = np.zeros(above_1.mask.shape, np.uint16)
     out[v, u] = np.where(label > 0, label, remembered)
-    return nearest_label(out, above_1.mask, _REACH * above_1.pixels_per_metre(current.intrinsics))
+    return nearest_label(
+        out, above_1.mask, current.depth, _REACH * above_1.pixels_per_metre(current.intrinsics)
+    )
 
 
 def draw_labels(
@@ -112,10 +117,13 @@ def draw_labels(
     return drawn
 
 
-def nearest_label(label: NDArray[np.uint16], inside: NDArray[np.bool_], reach: float) -> NDArray[np.uint16]:
+def nearest_label(
+    label: NDArray[np.uint16], inside: NDArray[np.bool_], depth: NDArray[np.float32], reach: float
+) -> NDArray[np.uint16]:
     """Give each unlabelled pixel inside [H, W] the label nearest to it, UNKNOWN beyond `reach` pixels.
 
-    Objects that come into view, or are put there, must not become part of their neighbours.
+    Objects that come into view, or are put there, must not become part of their neighbours; nor what a thing
+    uncovers that has moved away: what is more than a rim, and at another `depth` [H, W], m.
     """
     if not inside.any():
         return label
@@ -124,9 +132,15 @@ def nearest_label(label: NDArray[np.uint16], inside: NDArray[np.bool_], reach: f
     empty = inside[region] & (old == 0)
     filled = np.where(empty, UNKNOWN, old)
     if empty.any() and old.any():
-        nearest, distance = nearest_values(old, old > 0)
-        near = empty & (distance <= reach)
-        filled[near] = nearest[near]
+        nearest, distance = nearest_values(np.arange(old.size).reshape(old.shape), old > 0)
+        broad = cv2.morphologyEx(empty.view(np.uint8), cv2.MORPH_OPEN, _RIM) > 0
+        near = np.flatnonzero(empty & (distance <= reach))
+        there = nearest.ravel()[near]
+        # On its own rim a thing has no depth, or that of what is behind it.
+        front = cv2.erode(np.where((old > 0) & (depth[region] > 0), depth[region], np.float32(np.inf)), _RIM)
+        z, z_there = depth[region].ravel()[near], front.ravel()[there]
+        uncovered = broad.ravel()[near] & (z > 0) & np.isfinite(z_there) & (np.abs(z - z_there) > _DEPTH_AGREES)
+        filled.ravel()[near[~uncovered]] = old.ravel()[there[~uncovered]]
     out[region] = filled
     return out
 

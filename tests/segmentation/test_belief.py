@@ -3,9 +3,16 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from riseg_drake.geometry.se3 import exp_se3, inverse
-from riseg_drake.segmentation.belief import Bodies, rebased
+from riseg_drake.segmentation.belief import (
+    BeliefParameters,
+    Bodies,
+    _carried_evidence,
+    _completed,
+    rebased,
+)
 
 
 def test_how_bodies_had_moved_when_the_reference_was_taken_is_told_since_the_new_keyframe():
@@ -30,3 +37,25 @@ def test_how_bodies_had_moved_when_the_reference_was_taken_is_told_since_the_new
     at_the_keyframe = rebased(now, now, old, following)
     for X in at_the_keyframe.motions_K:
         np.testing.assert_allclose(X, np.eye(4), atol=1e-12)
+
+
+def test_what_a_body_uncovers_is_not_that_body_and_may_be_one_that_stood_beside_it():
+    # 0 moved, 1 stood, 2 has never moved, 3 and 4 are uncovered.
+    borders = np.array([[0, 1], [0, 3], [1, 3], [2, 3], [3, 4]])
+    new = SimpleNamespace(borders=borders)
+    old = SimpleNamespace(borders=np.array([[0, 1]]), count=3)
+    source, body = np.array([0, 1, 2, -1, -1]), np.array([5, 6, 0, 0, 0])
+    moved = np.array([True, False, False, False, False])
+    prior = np.full(5, 2.0)
+    evidence = _carried_evidence(
+        old, np.array([2.0]), np.array([-7.0]), new, prior, source, body, moved, BeliefParameters(inside=2.0)
+    )
+    assert evidence == pytest.approx([-7.0, -4.0, 0.0, 0.0, 0.0])
+
+
+def test_what_is_uncovered_takes_the_id_of_most_of_its_part_and_what_was_known_keeps_its_own():
+    part = np.array([0, 0, 0, 1, 1, 2, 2])
+    body = np.array([4, 0, 0, 5, 0, 6, 0])
+    known = np.array([True, True, False, True, False, True, False])
+    area = np.array([30, 10, 10, 10, 11, 11, 10])
+    np.testing.assert_array_equal(_completed(body, known, part, area), [4, 0, 4, 5, 0, 6, 6])

@@ -153,15 +153,28 @@ def test_the_nearest_label_reaches_as_far_as_asked_and_not_farther() -> None:
     label[5:15, 5:10], label[5:15, 30:35] = 3, 4
     inside = np.zeros(label.shape, bool)
     inside[5:15, 5:35] = True
-    out = nearest_label(label, inside, reach=4.0)
+    out = nearest_label(label, inside, np.ones(label.shape, np.float32), reach=4.0)
     assert (out[5:15, 5:13] == 3).all()
     assert (out[5:15, 15:25] == UNKNOWN).all()
     assert (out[5:15, 27:35] == 4).all()
     assert not out[~inside].any()
 
 
+@pytest.mark.parametrize(("lower", "width", "taken"), [(0.007, 20, 4), (0.009, 20, 0), (0.009, 5, 4)])
+def test_what_a_thing_uncovers_below_it_is_not_its_own_but_its_rim_is(lower, width, taken) -> None:
+    """Within 4 pixels, 8 mm of depth and a rim of six pixels."""
+    label = np.zeros((20, 40), np.uint16)
+    label[:, :10] = 3
+    inside = np.zeros(label.shape, bool)
+    inside[:, : 10 + width] = True
+    depth = np.where(label > 0, 1.0, 1.0 + lower).astype(np.float32)
+    out = nearest_label(label, inside, depth, reach=4.0)
+    assert (out[:, 10 : 10 + taken] == 3).all()
+    assert (out[:, 10 + taken : 10 + width] == UNKNOWN).all()
+
+
 def test_without_any_label_all_that_stands_there_is_unknown() -> None:
     inside = np.zeros((20, 40), bool)
     inside[5:15, 5:35] = True
-    out = nearest_label(np.zeros(inside.shape, np.uint16), inside, reach=4.0)
+    out = nearest_label(np.zeros(inside.shape, np.uint16), inside, np.ones(inside.shape, np.float32), reach=4.0)
     np.testing.assert_array_equal(out, np.where(inside, UNKNOWN, 0))
