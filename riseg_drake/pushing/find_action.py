@@ -13,6 +13,7 @@ from riseg_drake.pushing.clusters import Cluster, ClustersParameters, find_clust
 from riseg_drake.pushing.contact import find_contacts
 from riseg_drake.pushing.decision import Criterion, Decision, Ending, PathStage
 from riseg_drake.pushing.gain import GainParameters, expected_gain
+from riseg_drake.pushing.levels import LevelsParameters, raised
 from riseg_drake.pushing.objects_to_segment import ObjectsToSegmentParameters, things_to_push
 from riseg_drake.pushing.push import NO_PUSH, Push
 from riseg_drake.pushing.push_path import PushPath
@@ -41,6 +42,7 @@ class FindActionParameters:
     validity: ValidityParameters = field(default_factory=ValidityParameters)
     pusher: Pusher = field(default_factory=Pusher)
     gain: GainParameters = field(default_factory=GainParameters)
+    levels: LevelsParameters = field(default_factory=LevelsParameters)
     paths: int = 30
     """The arm's path is planned for at most this many candidates, the best that are not alike."""
 
@@ -74,11 +76,13 @@ def find_action(
     search = _PathSearch(plan_path, parameters.paths)
     fails: Counter[Criterion | PathStage] = Counter()
     candidates = 0
-    # What has never moved comes before what is in doubt; alone before with others.
+    # What has never moved comes before what is in doubt; alone before with others; what lies on something else
+    # before both, as it has moved with it.
     known = replace(table, segmented=table.segmented | (doubtful > 0), doubtful=None)
     stages = (
         (unmoved, known, True),
         (unmoved, known, False),
+        *((upper, above, True) for upper, above in raised(table, doubtful, parameters.levels)),
         (doubtful > 0, table, True),
         (doubtful > 0, table, False),
     )

@@ -1,0 +1,82 @@
+"""What lies on other things is pushed at its own height."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from riseg_drake.pushing.find_action import find_action
+from riseg_drake.pushing.levels import LevelsParameters, raised
+from riseg_drake.pushing.push import NO_PUSH
+
+
+def stack(drawn, lower=0.04, upper=0.08):
+    """A small box on a large one, which have moved as one."""
+    drawn.box(0.5, 0.0, 0.12, 0.10, height=lower, doubtful=1)
+    return drawn.box(0.52, 0.01, 0.05, 0.05, height=upper, doubtful=1)
+
+
+def levels(drawn):
+    table = drawn.map()
+    return list(raised(table, table.doubtful, LevelsParameters()))
+
+
+def test_above_the_lower_box_the_map_holds_the_upper_one_alone(drawn):
+    [(upper, above)] = levels(stack(drawn))
+    assert np.array_equal(upper, drawn.height > 0.05)
+    assert np.array_equal(above.objects, upper)
+    assert not above.segmented.any()
+    # 4 mm above what the bar passes over.
+    assert above.height[upper] == pytest.approx(0.08 - 0.044, abs=1e-6)
+    assert above.ground(np.array([[0.5, 0.0]])) == pytest.approx(0.044, abs=1e-6)
+
+
+def test_the_level_follows_a_table_that_is_not_at_zero_height(drawn):
+    stack(drawn)
+    table = replace(drawn.map(), plane_W=np.array([0.0, 0.0, 1.0, 0.1]))
+    [(_, above)] = raised(table, table.doubtful, LevelsParameters())
+    assert above.ground(np.array([[0.5, 0.0]])) == pytest.approx(-0.1 + 0.044, abs=1e-6)
+
+
+def test_the_upper_box_is_pushed_just_above_the_lower_one(drawn):
+    push = find_action(stack(drawn).map(), np.random.default_rng(0)).push
+    assert push.tip_height == pytest.approx(0.008)
+    assert push.p_WE[2] == pytest.approx(0.044 + 0.008, abs=1e-6)
+    assert np.abs(push.cluster_W - [0.52, 0.01]).max() <= 0.026
+    # The tip is lowered behind the upper box, above the lower one.
+    assert np.linalg.norm(push.p_WE[:2] - [0.52, 0.01]) < 0.06
+
+
+def test_of_two_levels_that_with_the_longer_edge_is_taken(drawn):
+    stack(drawn).box(0.46, -0.03, 0.02, 0.02, height=0.16, doubtful=1)
+    [(upper, above)] = levels(drawn)
+    assert above.ground(np.array([[0.5, 0.0]])) == pytest.approx(0.044, abs=1e-6)
+    assert above.segmented.sum() == 0
+    assert upper.sum() == (drawn.height > 0.05).sum()
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda t: t.box(0.5, 0.0, 0.1, 0.1, height=0.05, doubtful=1),  # no step
+        lambda t: stack(t, 0.04, 0.049),  # too low a step for the bar
+        lambda t: t.box(0.5, 0, 0.1, 0.038, doubtful=1).box(
+            0.5, 0, 0.05, 0.03, height=0.08, doubtful=1
+        ),  # narrow
+        lambda t: t.box(0.5, 0.0, 0.1, 0.1, doubtful=1).box(0.5, 0.0, 0.014, 0.02, height=0.08, doubtful=1),
+        lambda t: t.box(0.5, 0.0, 0.1, 0.1).box(0.5, 0.0, 0.05, 0.05, height=0.08),  # not in doubt
+        lambda t: t.box(0.45, 0.0, 0.05, 0.05, doubtful=1).box(0.5, 0.0, 0.05, 0.05, height=0.09, doubtful=2),
+    ],
+)
+def test_a_thing_without_a_step_to_speak_of_has_no_level(drawn, draw):
+    assert levels(draw(drawn)) == []
+
+
+def test_another_known_thing_at_that_height_is_in_the_way(drawn):
+    stack(drawn).box(0.575, 0.01, 0.03, 0.12, height=0.09, segmented=True)
+    [(upper, above)] = levels(drawn)
+    assert above.segmented.sum() == pytest.approx(15 * 60, abs=80)
+    assert not (above.segmented & upper).any()
+    push = find_action(drawn.map(), np.random.default_rng(0)).push
+    assert push is not NO_PUSH
+    assert push.direction_W[0] < 0.9
