@@ -1,12 +1,14 @@
 """`riseg evaluate --suite films`: what of a film is taken for an object, where nothing or little moves.
 
-Ten films of still scenes by the simulated camera with all its errors, and recordings of one's own. Each leaves
-its masks in a folder of its own with a `film.json`; what is finished is not done again.
+Ten films of still scenes by the simulated camera with all its errors, and recordings of one's own, begun with
+each of their first frames in turn: which frame is the first must not matter. Each leaves its masks in a folder
+of its own with a `film.json`; what is finished is not done again.
 """
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.metadata import version
+from itertools import islice
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -33,6 +35,8 @@ from riseg_drake.recording.writer import RecordingWriter
 from riseg_drake.stations.still_film import StillFilmParameters, still_film
 
 FILMS = 10
+STARTS = 5
+"""So many times is a recording segmented, begun with frame 0, 1, ..."""
 FILM_FILE = "film.json"
 REPORT = "films.md"
 SUITE = "films"
@@ -76,7 +80,7 @@ def films_command(
                     result = segment_film(work / RECORDING, work, scenario, film, console)
                 rows.append((f"still scene, seed {film}", result))
             for recording, work in zip(real, theirs, strict=True):
-                rows.append((work.name, _finished(work) or segment_film(recording, work, scenario, 0, console)))
+                rows += _begun_with_each(recording, work, scenario, console)
             shown = {"simulated": own[0] / RECORDING, **dict(zip([w.name for w in theirs], real, strict=True))}
             figures = {name: depth_figures(recording) for name, recording in shown.items()}
         all_films = _together([row for _, row in rows[:FILMS]])
@@ -91,17 +95,21 @@ def films_command(
 
 
 def segment_film(
-    recording: Path, work: Path, scenario: Path | None, seed: int, console: Console
+    recording: Path, work: Path, scenario: Path | None, seed: int, console: Console, start: int = 0
 ) -> dict[str, Any]:
-    """Segment one film into a folder: masks, the worst frame's picture, and the scores, which are returned."""
+    """Segment one film into a folder: masks, the worst frame's picture, and the scores, which are returned.
+
+    The frames before number `start` are left out.
+    """
     reader = RecordingReader(recording)
     parameters = load_scenario(scenario)
     replay = Replay(parameters, recorded_view(reader, parameters, None, "camera").view, seed)
     scores = FilmScores(true_things(recording))
     (work / "mask").mkdir(parents=True, exist_ok=True)
     most, worst = -1, None
-    for number, frame in enumerate(_told(reader, len(reader), f"segment {work.name}", console)):
-        start = process_time()
+    frames = islice(_told(reader, len(reader), f"segment {work.name}", console), start, None)
+    for number, frame in enumerate(frames, start):
+        began = process_time()
         try:
             mask = replay.mask_after(frame)
         except NoPlaneError as error:
@@ -109,7 +117,7 @@ def segment_film(
             scores.without_table += 1
             continue
         before = scores.false_pixels
-        scores.add(number, mask, frame.robot, process_time() - start)
+        scores.add(number, mask, frame.robot, process_time() - began)
         write_png(work / "mask" / f"{number:06d}.png", mask)
         if scores.false_pixels - before > most:
             most, worst = scores.false_pixels - before, draw_masks(frame.color, mask)
@@ -118,6 +126,18 @@ def segment_film(
     result = scores.as_dict()
     write_text(work / FILM_FILE, to_json(result))
     return result
+
+
+def _begun_with_each(
+    recording: Path, work: Path, scenario: Path | None, console: Console
+) -> list[tuple[str, dict[str, Any]]]:
+    """Rows of a recording, begun with each of its first frames."""
+    rows = []
+    for start in range(min(STARTS, len(RecordingReader(recording)))):
+        folder = work / f"from_{start}" if start else work
+        row = _finished(folder) or segment_film(recording, folder, scenario, 0, console, start)
+        rows.append((f"{work.name}, from frame {start}" if start else work.name, row))
+    return rows
 
 
 def _recordings(folder: Path | None) -> list[Path]:

@@ -29,8 +29,11 @@ def folder(tmp_path_factory):
 
 def test_each_film_has_its_row_and_the_recordings_too(folder) -> None:
     summary = json.loads((folder / "more" / "summary.json").read_text())
-    assert list(summary["films"]) == ["still scene, seed 5", "still scene, seed 6", "recording"]
-    assert {row["frames"] + row["without_table"] for row in summary["films"].values()} == {3}
+    later = ["recording, from frame 1", "recording, from frame 2"]
+    assert list(summary["films"]) == ["still scene, seed 5", "still scene, seed 6", "recording", *later]
+    assert [row["frames"] + row["without_table"] for row in summary["films"].values()] == [3, 3, 3, 2, 1]
+    masks = (folder / "more" / "recording" / "from_2" / "mask").iterdir()
+    assert [mask.name for mask in masks] == ["000002.png"]
     report = (folder / "more" / "films.md").read_text()
     assert "| ten still scenes | 6 |" in report
     assert "| | simulated | recording |" in report
