@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 import cv2
 import numpy as np
@@ -79,12 +80,17 @@ def find_action(
     # What has never moved comes before what is in doubt; alone before with others; what lies on something else
     # before both, as it has moved with it.
     known = replace(table, segmented=table.segmented | (doubtful > 0), doubtful=None)
-    stages = (
-        (unmoved, known, True),
-        (unmoved, known, False),
-        *((upper, above, True) for upper, above in raised(table, doubtful, parameters.levels)),
-        (doubtful > 0, table, True),
-        (doubtful > 0, table, False),
+    on_top = raised(
+        table,
+        doubtful,
+        parameters.to_segment.minimum_area,
+        parameters.validity.d_push,
+        parameters.levels,
+    )
+    stages = chain(
+        ((unmoved, known, True), (unmoved, known, False)),
+        ((upper, above, True) for upper, above in on_top),
+        ((doubtful > 0, table, True), (doubtful > 0, table, False)),
     )
     for to_segment, scene, alone in stages:
         if not to_segment.any() or not (alone or parameters.validity.with_others):

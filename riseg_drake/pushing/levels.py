@@ -22,11 +22,6 @@ class LevelsParameters:
     """m; the least step of height: what the bar needs to meet the upper thing, and to pass over the lower."""
     over: float = 0.004
     """m; the level lies so much above what the bar is to pass over, whose depth errs."""
-    minimum_area: float = 3e-4
-    """m^2, of the upper part and of the lower."""
-    width: float = 0.04
-    """m; what is narrower is left alone: should it be one thing, it may fall over. Pushed at its top, it
-    falls once it has gone as far as it is wide: twice as far as a push goes."""
 
 
 _APART = 3
@@ -34,13 +29,19 @@ _APART = 3
 
 
 def raised(
-    table: TableMap, things: NDArray[np.int_], parameters: LevelsParameters
+    table: TableMap,
+    things: NDArray[np.int_],
+    minimum_area: float,
+    d_push: float,
+    parameters: LevelsParameters,
 ) -> Iterator[tuple[NDArray[np.bool_], TableMap]]:
     """For each thing that lies on another, by all that is seen, its upper part and the map above that level.
 
     Args:
         table: the scene.
         things: [rows, columns], ids of what may be several things, 0 elsewhere.
+        minimum_area: m^2, of the upper part and of the lower: what is smaller is no object.
+        d_push: how far a push goes, m.
         parameters: see there.
 
     Yields:
@@ -55,7 +56,8 @@ def raised(
         standing = table.objects & (table.height > level)
         upper, lower = thing & standing, thing & ~standing
         area = table.cell_area * min(np.count_nonzero(upper), np.count_nonzero(lower))
-        if area >= parameters.minimum_area and _width(thing, table) >= parameters.width:
+        # Should it be one thing, it may fall over: pushed at its top, once it has gone as far as it is wide.
+        if area >= minimum_area and _width(thing, table) >= 2 * d_push:
             yield (
                 upper,
                 replace(

@@ -35,7 +35,8 @@ class Push(Immutable):
     p_WE: NDArray[np.float64]
     """[3], where the tip E is lowered to, `clearance` (and half the bar) behind the contact, m."""
     tip_height: float
-    """Height of the tip above the table during the push, m."""
+    """Height of the tip during the push above the table, or above what carries the target where that lies on
+    other things, m."""
     direction_W: NDArray[np.float64]
     """[2], unit vector bc on the table."""
     p_WB: NDArray[np.float64]
@@ -49,7 +50,7 @@ class Push(Immutable):
     cluster_W: NDArray[np.float64]
     """[M, 2], the cluster's points P, m."""
     tallest: float
-    """Height of the tallest object on the table, m: the pusher crosses above it."""
+    """Height of the tallest object, m, above what `tip_height` is told from: the pusher crosses above it."""
     cost: float
     """What is lost of one object: less the more objects the push can be expected to settle."""
     path: "PushPath | None" = field(default=None, repr=False)

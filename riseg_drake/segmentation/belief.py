@@ -259,7 +259,7 @@ def _carried_evidence(
         remembered = old_evidence[place] + np.minimum(old_prior[place] - new_prior, 0)
     else:
         same_border, remembered = np.zeros(len(a), bool), np.zeros(len(a))
-    stood = (from_a < 0) & (from_b >= 0) & ~moved[b] | (from_b < 0) & (from_a >= 0) & ~moved[a]
+    stood = ((from_a < 0) ^ (from_b < 0)) & ~moved[a] & ~moved[b]
     apart = np.where(
         body[a] == body[b],
         np.where(body[a] > 0, parameters.inside / 2, 0),

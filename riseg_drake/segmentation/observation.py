@@ -177,21 +177,20 @@ def _fewest_motions(
     coupling = parameters.border * np.maximum(bond, parameters.border_least) * keyframe.length
     graph = PottsGraph(keyframe.count, keyframe.borders, coupling)
     needed, message = list(range(len(nats))), None
-    parts = np.array([np.bincount(part, n) for n in nats])
+    nats_of_parts = np.array([np.bincount(part, n) for n in nats])
     while True:
         unary = nats[needed].astype(np.float32)
         unary[1:] += np.float32(parameters.still)
         motion, message = potts_labels(unary, graph, message)
-        gains = []
+        gains, of_parts = [], nats_of_parts[needed]
         for k in range(1, len(needed)):
             mine = nats[np.ix_(needed, motion == k)]
             # All of a part, as far as it has this motion, would have another one.
             without, owner = np.delete(mine, k, axis=0) - mine[k], part[motion == k]
-            of_labels = float(np.min([np.bincount(owner, w) for w in without], axis=0).sum())
+            as_labelled = np.min([np.bincount(owner, w) for w in without], axis=0).sum()
             # Two other motions may each explain half of a part, and none all of it.
-            with_all = parts[needed]
-            of_parts = float((np.delete(with_all, k, axis=0).min(0) - with_all.min(0)).sum())
-            gains.append(max(of_labels, of_parts))
+            as_parts = (np.delete(of_parts, k, axis=0).min(0) - of_parts.min(0)).sum()
+            gains.append(float(max(as_labelled, as_parts)))
         if not gains or min(gains) >= price:
             return needed, motion
         dropped = int(np.argmin(gains)) + 1

@@ -132,15 +132,16 @@ def nearest_label(
     empty = inside[region] & (old == 0)
     filled = np.where(empty, UNKNOWN, old)
     if empty.any() and old.any():
-        nearest, distance = nearest_values(np.arange(old.size).reshape(old.shape), old > 0)
-        broad = cv2.morphologyEx(empty.view(np.uint8), cv2.MORPH_OPEN, _RIM) > 0
-        near = np.flatnonzero(empty & (distance <= reach))
-        there = nearest.ravel()[near]
-        # On its own rim a thing has no depth, or that of what is behind it.
-        front = cv2.erode(np.where((old > 0) & (depth[region] > 0), depth[region], np.float32(np.inf)), _RIM)
-        z, z_there = depth[region].ravel()[near], front.ravel()[there]
-        uncovered = broad.ravel()[near] & (z > 0) & np.isfinite(z_there) & (np.abs(z - z_there) > _DEPTH_AGREES)
-        filled.ravel()[near[~uncovered]] = old.ravel()[there[~uncovered]]
+        nearest, distance = nearest_values(old, old > 0)
+        near = empty & (distance <= reach)
+        broad = near & (cv2.morphologyEx(empty.view(np.uint8), cv2.MORPH_OPEN, _RIM) > 0)
+        if broad.any():
+            z = depth[region]
+            # On its own rim a thing has no depth, or that of what is behind it.
+            front = cv2.erode(np.where((old > 0) & (z > 0), z, np.float32(np.inf)), _RIM)
+            z_labelled, _ = nearest_values(front, old > 0)
+            near &= ~(broad & (z > 0) & np.isfinite(z_labelled) & (np.abs(z - z_labelled) > _DEPTH_AGREES))
+        filled[near] = nearest[near]
     out[region] = filled
     return out
 

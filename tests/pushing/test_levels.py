@@ -18,7 +18,7 @@ def stack(drawn, lower=0.04, upper=0.08):
 
 def levels(drawn):
     table = drawn.map()
-    return list(raised(table, table.doubtful, LevelsParameters()))
+    return list(raised(table, table.doubtful, 3e-4, 0.02, LevelsParameters()))
 
 
 def test_above_the_lower_box_the_map_holds_the_upper_one_alone(drawn):
@@ -34,7 +34,7 @@ def test_above_the_lower_box_the_map_holds_the_upper_one_alone(drawn):
 def test_the_level_follows_a_table_that_is_not_at_zero_height(drawn):
     stack(drawn)
     table = replace(drawn.map(), plane_W=np.array([0.0, 0.0, 1.0, 0.1]))
-    [(_, above)] = raised(table, table.doubtful, LevelsParameters())
+    [(_, above)] = raised(table, table.doubtful, 3e-4, 0.02, LevelsParameters())
     assert above.ground(np.array([[0.5, 0.0]])) == pytest.approx(-0.1 + 0.044, abs=1e-6)
 
 
