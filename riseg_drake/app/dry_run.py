@@ -67,7 +67,8 @@ class DryRun:
         lowest = min(self._kinematics.clearance(push.path.position(t)) for t in times[::4])
         x, y = push.p_WB[:2]
         self._console.print(
-            f"push {self._shown} at ({x:.3f}, {y:.3f}) m, {push.path.duration:.1f} s, nothing nearer than "
+            f"push {self._shown} at ({x:.3f}, {y:.3f}) m, tip at z = {push.p_WE[2]:.3f} m, "
+            f"{push.path.duration:.1f} s, nothing nearer than "
             f"{1e3 * lowest:.0f} mm to table or arm"
         )
         if self._meshcat is not None:

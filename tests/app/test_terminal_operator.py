@@ -60,6 +60,7 @@ def test_a_push_waits_for_its_answer(typed, permission):
     assert first is Permission.WAIT
     assert answer is permission
     assert out.getvalue().count("push at (0.420, 0.000)") == 1
+    assert "tip at z = 0.020 m" in out.getvalue()
 
 
 def test_what_is_no_answer_is_asked_again():
