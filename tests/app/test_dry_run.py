@@ -39,7 +39,7 @@ def push(turn=0.2):
     path = SimpleNamespace(
         duration=2.0, position=lambda t: READY + np.array([turn * t / 2.0, 0, 0, 0, 0, 0, 0])
     )
-    return SimpleNamespace(path=path, p_WB=np.array([0.5, 0.1, 0.02]))
+    return SimpleNamespace(path=path, p_WB=np.array([0.5, 0.1, 0.02]), p_WE=np.array([0.46, 0.1, 0.031]))
 
 
 def made(*answers):
@@ -74,6 +74,12 @@ def test_the_way_that_is_drawn_is_the_tips():
         )
     least = min(kinematics.clearance(wanted.path.position(t)) for t in np.linspace(0, 2, 50))
     assert f"nothing nearer than {1e3 * least:.0f} mm" in out.getvalue()
+
+
+def test_the_operator_reads_where_the_tip_goes_and_how_high():
+    run, _, out, _ = made("n")
+    run.permit(push())
+    assert "push 1 at (0.500, 0.100) m, tip at z = 0.031 m" in out.getvalue()
 
 
 def test_the_operator_may_end_it():
