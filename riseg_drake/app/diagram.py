@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import Meshcat
 from pydrake.lcm import DrakeLcm
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import (
     Context,
     Diagram,
@@ -73,8 +74,11 @@ class WiredDiagram:
         objects = station.objects if simulated else []
         self.object_names = {i: placed.name for i, placed in enumerate(objects, start=1)}
         """By object id, as in the ground truth; empty where nobody knows it."""
+        self.object_axes = {placed.name: placed.model.axes for placed in objects}
+        """By name, the unit vectors in B [k, 3] about which an object is a body of revolution."""
         self._refiner = refiner
         self._object_bodies = station.object_bodies if simulated else {}
+        self._centres = {i: RigidTransform(placed.model.centre) for i, placed in enumerate(objects, start=1)}
         self._ports: dict[str, OutputPort] = {}
 
     def read(self, port: str, context: Context) -> Any:
@@ -137,10 +141,10 @@ class WiredDiagram:
         return self.read("cheat.label_image", context).data[..., 0].astype(np.uint16)
 
     def true_poses(self, context: Context) -> dict[str, NDArray[np.float64]]:
-        """The true poses X_WB [4, 4] of the objects, by name."""
+        """The true poses X_WBcm [4, 4] of the objects, by name: B's axes in the centre of mass."""
         poses = self.read("cheat.body_poses", context)
         return {
-            self.object_names[object_id]: poses[int(body)].GetAsMatrix4()
+            self.object_names[object_id]: (poses[int(body)] @ self._centres[object_id]).GetAsMatrix4()
             for object_id, body in self._object_bodies.items()
         }
 

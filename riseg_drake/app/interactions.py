@@ -33,9 +33,11 @@ class Truth:
     draw: Callable[[], NDArray[np.uint16]] = field(repr=False)
     """Gives the true visible object ids [H, W]; drawing them takes as long as a picture."""
     poses: dict[str, NDArray[np.float64]]
-    """The true poses X_WB [4, 4] of the objects, by name."""
+    """The true poses X_WBcm [4, 4] of the objects, by name: B's axes in the centre of mass."""
     names: Mapping[int, str]
     """By object id."""
+    axes: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    """By name, the unit vectors in B [k, 3] about which an object is a body of revolution."""
 
     @cached_property
     def labels(self) -> NDArray[np.uint16]:
@@ -148,7 +150,12 @@ def simulated_truth(wired: WiredDiagram) -> TruthSource:
     """The truth that a simulated station knows."""
 
     def truth(_: Frame, context: Context) -> Truth:
-        return Truth(lambda: wired.true_labels(context), wired.true_poses(context), wired.object_names)
+        return Truth(
+            lambda: wired.true_labels(context),
+            wired.true_poses(context),
+            wired.object_names,
+            wired.object_axes,
+        )
 
     return truth
 
@@ -246,7 +253,7 @@ class _Book:
             scores=score(mask, truth.labels) if truth else None,
             disturbance=None
             if self._start is None or truth is None
-            else Disturbance(self._pushed, motion_between(self._start, self._before, truth.poses)),
+            else Disturbance(self._pushed, motion_between(self._start, self._before, truth.poses, truth.axes)),
             in_motion=in_motion(self._overlap_f, overlap_f_of(self._moved, mask, truth.labels))
             if truth
             else None,

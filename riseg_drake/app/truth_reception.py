@@ -42,8 +42,9 @@ class TruthReception:
         columns = slice(self._first_column, self._first_column + frame.color.shape[1])
         return Truth(
             draw=lambda: decode_labels(lcmt_image_array.decode(labels)).labels[:, columns],
-            poses={true_poses.names[i]: X_WB for i, X_WB in true_poses.X_WB.items()},
+            poses={true_poses.names[i]: X_WBcm for i, X_WBcm in true_poses.X_WBcm.items()},
             names=true_poses.names,
+            axes={true_poses.names[i]: axes for i, axes in true_poses.axes.items()},
         )
 
     def _take_labels(self, data: bytes) -> None:  # LCM calls this from C: nothing may be raised

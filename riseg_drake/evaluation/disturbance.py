@@ -1,4 +1,18 @@
-"""What the interactions did to the scene: the paper promises to leave it as it was."""
+"""What the interactions did to the scene: the paper promises to leave it as it was.
+
+Poses are X_WBcm [4, 4]: the axes of a body's frame B in its centre of mass Bcm. Origins of frames say little,
+as those of lying things lie on their undersides.
+
+*Tilt* is the angle by which the direction in B that pointed up at the start leans now, less what rolling does:
+of a body of revolution only the change of the angle between its axis and the vertical counts, of a ball
+nothing. So a can or a lying bottle that rolls does not tilt, however far; a can that stood and lies now is
+tilted by 90 degrees, and so is a cube that lies on another face. Heights could not tell the last from the
+first: in both, the centre of mass is as high as before.
+
+An object has *toppled* once it is tilted by more than 20 degrees. It *fell* if its centre of mass came down by
+more than 1 cm and it did not topple: it slid or rolled off another. It has *left the table* if its centre of
+mass is below the top.
+"""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,9 +26,12 @@ from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.geometry.se3 import move_points
 
 TOPPLED_DEG = 20.0
-"""An object has toppled once it leans so much more than at the start, degrees."""
-FALLEN = 0.02
-"""An object has left the table once its origin is so much below the top (or below where it started), m."""
+"""An object has toppled once it is tilted by more than this, degrees."""
+FELL = 0.01
+"""An object that did not topple fell if its centre of mass came down by more than this, m."""
+
+NO_AXES: NDArray = np.zeros((0, 3))
+"""Of what is no body of revolution."""
 
 
 @dataclass(frozen=True)
@@ -22,13 +39,25 @@ class ObjectMotion:
     """What one interaction did to one object."""
 
     moved_m: float
-    """Distance between the object's origin before and after, m."""
+    """Distance between the object's centre of mass before and after, m."""
     tilted_deg: float
-    """Angle by which its upright has turned since before the interaction, degrees."""
+    """Its tilt since before the interaction, degrees."""
     tilted_in_all_deg: float = 0.0
     """The same since before the first interaction, degrees."""
     left_table: bool = False
-    """It is lower now than anything on the table can be."""
+    """Its centre of mass is below the table's top."""
+    came_down_m: float = 0.0
+    """By how much its centre of mass is lower than before the first interaction, m; less than 0: higher."""
+
+    @property
+    def toppled(self) -> bool:
+        """Whether it has turned over since before the first interaction."""
+        return self.tilted_in_all_deg > TOPPLED_DEG
+
+    @property
+    def fell(self) -> bool:
+        """Whether it is lower than before the first interaction without having turned over."""
+        return self.came_down_m > FELL and not self.toppled
 
 
 @dataclass(frozen=True)
@@ -51,38 +80,60 @@ class DisturbanceFigures:
     others_median_m: float
     """How far all other objects moved, median."""
     tilt_max_deg: float
-    """The most that any object leans more than at the start."""
+    """The most that any object is tilted against the start."""
     toppled: int
-    """Objects that came to lean more than 20 degrees in these interactions."""
+    """Objects that turned over in these interactions."""
+    fell: int
+    """Objects that came down onto the table in them, or onto something else, without turning over."""
     left_table: int
-    """Objects that left the table in these interactions."""
+    """Objects that left the table in them."""
 
 
 def motion_between(
-    start: Mapping[str, NDArray], before: Mapping[str, NDArray], after: Mapping[str, NDArray]
+    start: Mapping[str, NDArray],
+    before: Mapping[str, NDArray],
+    after: Mapping[str, NDArray],
+    axes: Mapping[str, NDArray],
 ) -> dict[str, ObjectMotion]:
-    """What happened to every object, by its name, from its poses X_WB [4, 4].
+    """What happened to every object, by its name, from its poses X_WBcm [4, 4].
 
     Args:
         start: before the first interaction.
         before: before this interaction.
         after: after it.
+        axes: unit vectors in B [k, 3] about which it is a body of revolution; may lack what is none.
     """
     return {
         name: ObjectMotion(
             moved_m=float(np.linalg.norm(X_WB[:3, 3] - before[name][:3, 3])),
-            tilted_deg=_tilt(before[name], X_WB),
-            tilted_in_all_deg=_tilt(start[name], X_WB),
-            left_table=bool(X_WB[2, 3] < min(0.0, start[name][2, 3]) - FALLEN),
+            tilted_deg=tilt(before[name], X_WB, axes.get(name, NO_AXES)),
+            tilted_in_all_deg=tilt(start[name], X_WB, axes.get(name, NO_AXES)),
+            left_table=bool(X_WB[2, 3] < 0.0),
+            came_down_m=float(start[name][2, 3] - X_WB[2, 3]),
         )
         for name, X_WB in after.items()
     }
 
 
-def _tilt(X_WB0: NDArray, X_WB1: NDArray) -> float:
-    """By how much the direction that pointed up leans now, degrees; turning on the table is no tilt."""
-    R = X_WB1[:3, :3] @ X_WB0[:3, :3].T  # turns the object's old attitude into the new one
-    return math.degrees(math.acos(min(1.0, max(-1.0, R[2, 2]))))
+def tilt(X_WB0: NDArray, X_WB1: NDArray, axes: NDArray = NO_AXES) -> float:
+    """By how much an object leans more than it did, degrees; neither turning on the table nor rolling counts.
+
+    Args:
+        X_WB0: [4, 4], before.
+        X_WB1: [4, 4], after.
+        axes: unit vectors in B [k, 3] about which it is a body of revolution; none, one, or a ball's three.
+    """
+    R_WB0, R_WB1 = X_WB0[:3, :3], X_WB1[:3, :3]
+    if len(axes) == 0:
+        return _from_vertical(R_WB1 @ R_WB0.T[:, 2])
+    if len(axes) == 1:
+        return abs(_from_vertical(R_WB1 @ axes[0]) - _from_vertical(R_WB0 @ axes[0]))
+    return 0.0
+
+
+def _from_vertical(direction_W: NDArray) -> float:
+    """The angle between a unit vector [3] and the vertical, degrees."""
+    return math.degrees(math.atan2(math.hypot(direction_W[0], direction_W[1]), direction_W[2]))
 
 
 def object_at(p_WQ: NDArray, frame: Frame, labels: NDArray) -> int | None:
@@ -115,7 +166,7 @@ def _figures(scenes: Sequence[Sequence[Disturbance]], steps: Iterable[int]) -> D
     pushed: list[float] = []
     others: list[float] = []
     tilts: list[float] = []
-    interactions = toppled = left_table = 0
+    interactions = toppled = fell = left_table = 0
     for i in steps:
         for scene in scenes:
             if i >= len(scene):
@@ -126,7 +177,8 @@ def _figures(scenes: Sequence[Sequence[Disturbance]], steps: Iterable[int]) -> D
                 (pushed if name == scene[i].pushed else others).append(motion.moved_m)
                 tilts.append(motion.tilted_in_all_deg)
                 was = before.get(name, ObjectMotion(0.0, 0.0))
-                toppled += motion.tilted_in_all_deg > TOPPLED_DEG >= was.tilted_in_all_deg
+                toppled += motion.toppled and not was.toppled
+                fell += motion.fell and not (was.fell or was.toppled or motion.left_table)
                 left_table += motion.left_table and not was.left_table
     return DisturbanceFigures(
         interactions=interactions,
@@ -134,5 +186,6 @@ def _figures(scenes: Sequence[Sequence[Disturbance]], steps: Iterable[int]) -> D
         others_median_m=float(np.median(others)) if others else float("nan"),
         tilt_max_deg=max(tilts, default=float("nan")),
         toppled=toppled,
+        fell=fell,
         left_table=left_table,
     )

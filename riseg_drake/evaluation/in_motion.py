@@ -31,7 +31,7 @@ class InMotion:
 def moved_objects(
     before: Mapping[str, NDArray], now: Mapping[str, NDArray], names: Mapping[int, str]
 ) -> set[int]:
-    """The ids of the objects that have moved by 1 cm or more, from their poses X_WB [4, 4] by name."""
+    """The ids of the objects that have moved by 1 cm or more, from their poses X_WBcm [4, 4] by name."""
     return {
         object_id
         for object_id, name in names.items()

@@ -7,6 +7,7 @@ from math import isnan
 import numpy as np
 
 from riseg_drake.evaluation.disturbance import (
+    FELL,
     TOPPLED_DEG,
     DisturbanceFigures,
     disturbance_of_all,
@@ -26,6 +27,7 @@ DISTURBANCE_HEAD = (
     "others moved, median mm",
     "most tilt, degrees",
     "toppled",
+    "fell",
     "left the table",
 )
 _HEAD = ("Overlap P", "R", "F", "Boundary P", "R", "F", "found %")
@@ -153,8 +155,9 @@ def _disturbance_section(scenes: Sequence[SceneResult], last_step: int) -> str:
     return (
         markdown_table(("after", *DISTURBANCE_HEAD), rows)
         + f"""
-The pushed object is the one that the push was planned to meet. Tilt is against the start of the run; more
-than {TOPPLED_DEG:g} degrees count as toppled, also where a ball has merely rolled.
+The pushed object is the one that the push was planned to meet. Tilt is against the start of the run, and
+rolling is none; more than {TOPPLED_DEG:g} degrees count as toppled. What came down by more than
+{100 * FELL:g} cm without toppling fell.
 """
     )
 
@@ -167,6 +170,7 @@ def disturbance_cells(figures: DisturbanceFigures) -> list[str]:
         _number(1000 * figures.others_median_m, 2),
         _number(figures.tilt_max_deg, 1),
         str(figures.toppled),
+        str(figures.fell),
         str(figures.left_table),
     ]
 

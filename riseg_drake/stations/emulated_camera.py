@@ -56,6 +56,8 @@ class EmulatedCamera:
         self._bodies = {i: world.plant.get_body(index) for i, index in world.object_bodies.items()}
         self.names = {i: placed.name for i, placed in enumerate(world.objects, start=1)}
         """By object id."""
+        self.axes = {i: placed.model.axes for i, placed in enumerate(world.objects, start=1)}
+        """By object id, the unit vectors in B [k, 3] about which it is a body of revolution."""
         diagram = builder.Build()
         self._root = diagram.CreateDefaultContext()
         self._plant_context = world.plant.GetMyMutableContextFromRoot(self._root)
@@ -83,8 +85,11 @@ class EmulatedCamera:
         return self._table[seen].astype(np.uint16)
 
     def object_poses(self) -> dict[int, RigidTransform]:
-        """X_WB of each object id, of the world as it is arranged."""
-        return {i: body.EvalPoseInWorld(self._plant_context) for i, body in self._bodies.items()}
+        """X_WBcm of each object id, of the world as it is arranged: B's axes in the centre of mass."""
+        return {
+            i: body.EvalPoseInWorld(self._plant_context) @ RigidTransform(body.default_com())
+            for i, body in self._bodies.items()
+        }
 
 
 def seen_beside(depth: NDArray[np.float32], camera: CameraConfig) -> NDArray[np.float32]:

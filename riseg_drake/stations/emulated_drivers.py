@@ -232,7 +232,8 @@ class CameraSide:
         if moment.is_standing:  # a third of the time that a picture takes; nobody scores masks on the way
             labels = encode_labels(self._camera.labels(), stamp_ms, self.published)
             self._lcm.Publish(LABEL_CHANNEL, labels.encode())
-        poses = encode_poses(self._camera.names, self._camera.object_poses(), stamp_ms)
+        camera = self._camera
+        poses = encode_poses(camera.names, camera.object_poses(), camera.axes, stamp_ms)
         self._lcm.Publish(POSE_CHANNEL, poses.encode())
         self._link.send(message.encode(), now)
         self.published += 1

@@ -19,6 +19,7 @@ from riseg_drake.host.model_files import ModelFileError, reading_model
 from riseg_drake.host.terminal import one_line
 from riseg_drake.stations.contact import touches_over_area
 from riseg_drake.stations.footprint import Footprint, footprint, shape_corners
+from riseg_drake.stations.roundness import axes_of_revolution
 
 
 class SceneError(ValueError):
@@ -39,6 +40,10 @@ class ObjectModel:
     """Points p_BP [n, 3], m, whose convex hull holds the body's collision geometry."""
     over_areas: bool
     """Whether it touches others over areas, or only at points."""
+    centre: NDArray
+    """Its centre of mass p_BBcm [3], m."""
+    axes: NDArray
+    """Unit vectors in B [k, 3] about which it is a body of revolution: none; one of a can, three of a ball."""
 
 
 def find_models(folders: str | Sequence[str], names: Sequence[str] = ()) -> list[ObjectModel]:
@@ -125,13 +130,15 @@ def measure(name: str, path: Path) -> ObjectModel:
     X_WB = RigidTransform(R_WB)
     try:
         outline = footprint(inspector, geometries, X_WB)
-        corners = [
-            inspector.GetPoseInFrame(g).multiply(shape_corners(inspector.GetShape(g)).T).T for g in geometries
-        ]
+        corners = np.vstack(
+            [inspector.GetPoseInFrame(g).multiply(shape_corners(inspector.GetShape(g)).T).T for g in geometries]
+        )
     except ValueError as error:
         raise SceneError(f"{path}: {error}") from error
     over_areas = any(touches_over_area(inspector, geometry) for geometry in geometries)
-    return ObjectModel(name, path, X_WB, outline, np.vstack(corners), over_areas)
+    centre = body.default_com()
+    axes = axes_of_revolution(corners - centre, np.vstack([np.eye(3), _principal_axes(body)]))
+    return ObjectModel(name, path, X_WB, outline, corners, over_areas, centre, axes)
 
 
 def resolve(path_or_url: str) -> Path:
@@ -165,6 +172,12 @@ def _masses_said(path: Path) -> list[float]:
         return [float(text) for text in said if text.strip()]
     except (ValueError, ElementTree.ParseError) as error:
         raise SceneError(f"{path} cannot be read: {one_line(error)}") from None
+
+
+def _principal_axes(body: RigidBody) -> NDArray:
+    """The directions [3, 3], one a row, about which a body would turn by itself."""
+    about_centre = body.default_spatial_inertia().Shift(body.default_com()).get_unit_inertia()
+    return np.linalg.eigh(about_centre.CopyToFullMatrix3())[1].T
 
 
 def _is_drawn(shape: Shape) -> bool:

@@ -280,7 +280,7 @@ def test_the_truth_behind_a_picture_is_found_by_its_stamp_in_a_replayed_log_too(
     truth = TruthReception(lcm, first_column=2, offset=lambda: offset)
     stamp = 1_790_000_000_123
     labels = np.arange(24, dtype=np.uint16).reshape(3, 8)
-    poses = encode_poses({1: "duck"}, {1: RigidTransform([0.1, 0.2, 0.3])}, stamp)
+    poses = encode_poses({1: "duck"}, {1: RigidTransform([0.1, 0.2, 0.3])}, {1: np.eye(3)[2:]}, stamp)
     lcm.Publish(POSE_CHANNEL, poses.encode())
     lcm.Publish(LABEL_CHANNEL, encode_labels(labels, stamp, 0).encode())
     lcm.HandleSubscriptions(0)
@@ -292,6 +292,7 @@ def test_the_truth_behind_a_picture_is_found_by_its_stamp_in_a_replayed_log_too(
     known = truth(frame(stamp / 1e3 + offset))
     np.testing.assert_array_equal(known.labels, labels[:, 2:6])
     np.testing.assert_allclose(known.poses["duck"][:3, 3], [0.1, 0.2, 0.3], atol=1e-6)
+    np.testing.assert_array_equal(known.axes["duck"], [[0.0, 0.0, 1.0]])
     assert truth(frame(stamp / 1e3 + offset + 0.1)) is None
 
 

@@ -32,7 +32,7 @@ def test_turning_on_the_table_is_no_tilt_and_leaning_is():
     X_WB0 = turned(turned(np.eye(4), "x", 17), "y", -11)
     before = {"a": X_WB0, "b": X_WB0}
     after = {"a": moved(turned(X_WB0, "z", 70), 0.03, 0.04, 0), "b": turned(X_WB0, "y", 10)}
-    motions = motion_between(before, before, after)
+    motions = motion_between(before, before, after, {})
     assert motions["a"].moved_m == pytest.approx(0.05)
     assert motions["a"].tilted_deg == pytest.approx(0, abs=1e-5)
     assert motions["b"].tilted_deg == pytest.approx(10)
@@ -41,20 +41,74 @@ def test_turning_on_the_table_is_no_tilt_and_leaning_is():
 def test_small_tilts_add_up_to_one_since_the_start():
     start = {"a": np.eye(4)}
     before = {"a": turned(np.eye(4), "x", 15)}
-    motion = motion_between(start, before, {"a": turned(np.eye(4), "x", 25)})["a"]
+    motion = motion_between(start, before, {"a": turned(np.eye(4), "x", 25)}, {})["a"]
     assert motion.tilted_deg == pytest.approx(10)
     assert motion.tilted_in_all_deg == pytest.approx(25)
 
 
+STANDING = moved(turned(np.eye(4), "z", 20), 0.5, 0.1, 0.056)
+"""X_WBcm of a can of radius 30 and height 112 mm, its axis B's z."""
+LYING = moved(turned(turned(np.eye(4), "y", 90), "z", 35), 0.5, 0.1, 0.030)
+CUBE = moved(np.eye(4), 0.5, 0.1, 0.025)
+AXIS = np.array([[0.0, 0.0, 1.0]])
+BALL = np.eye(3)
+NOT_ROUND = np.zeros((0, 3))
+ROLLED = moved(turned(turned(turned(LYING, "z", -35), "x", 90), "z", 35), 0.03 * np.pi / 2, 0, 0)
+
+
 @pytest.mark.parametrize(
-    ("height", "fall", "left"),
-    [(0.04, 0.0, False), (0.04, 0.05, False), (0.04, 0.07, True), (-0.1, 0.01, False), (-0.1, 0.03, True)],
-    ids=["stands", "lies flat", "fell", "origin below the body", "that one fell"],
+    ("before", "after", "axes", "tilt", "verdict"),
+    [
+        (LYING, ROLLED, AXIS, 0.0, ""),
+        (LYING, moved(turned(ROLLED, "z", 64), 0.1, -0.1, 0), AXIS, 0.0, ""),
+        (LYING, ROLLED, NOT_ROUND, 90.0, "toppled"),
+        (STANDING, LYING, AXIS, 90.0, "toppled"),
+        (LYING, STANDING, AXIS, 90.0, "toppled"),
+        (STANDING, turned(STANDING, "x", 180), AXIS, 180.0, "toppled"),
+        (STANDING, turned(STANDING, "z", 120), AXIS, 0.0, ""),
+        (STANDING, turned(STANDING, "x", 35), AXIS, 35.0, "toppled"),
+        (CUBE, turned(CUBE, "y", 90), NOT_ROUND, 90.0, "toppled"),
+        (CUBE, turned(CUBE, "y", 35), NOT_ROUND, 35.0, "toppled"),
+        (CUBE, turned(CUBE, "y", 15), NOT_ROUND, 15.0, ""),
+        (CUBE, turned(turned(CUBE, "y", 75), "x", 110), BALL, 0.0, ""),
+        (moved(CUBE, 0, 0, 0.04), CUBE, NOT_ROUND, 0.0, "fell"),
+        (moved(LYING, 0, 0, 0.04), ROLLED, AXIS, 0.0, "fell"),
+        (moved(CUBE, 0, 0, 0.04), turned(CUBE, "x", -90), NOT_ROUND, 90.0, "toppled"),
+        (CUBE, moved(CUBE, 0, 0, 0.04), NOT_ROUND, 0.0, ""),
+        (moved(CUBE, 0, 0, 0.008), CUBE, NOT_ROUND, 0.0, ""),
+    ],
+    ids=[
+        "a can rolls by a quarter",
+        "it rolls and turns on the table",
+        "what is not round does not roll",
+        "a can that stood lies",
+        "one that lay stands",
+        "one stands on its head",
+        "one spins where it stands",
+        "one leans by 35 degrees",
+        "a cube lies on another face, as high as before",
+        "a box leans by 35 degrees",
+        "one leans a little",
+        "a ball rolls anyhow",
+        "a box slides off another",
+        "a can rolls off one",
+        "a box falls off one and turns over",
+        "a box is pushed onto another",
+        "a thing comes down from a sheet",
+    ],
 )
-def test_only_what_is_lower_than_the_table_has_left_it(height, fall, left):
-    start = {"a": moved(np.eye(4), 0, 0, height)}
-    after = {"a": moved(start["a"], 0, 0, -fall)}
-    assert motion_between(start, start, after)["a"].left_table is left
+def test_what_topples_has_turned_over_and_what_falls_has_come_down_without(before, after, axes, tilt, verdict):
+    motion = motion_between({"a": before}, {"a": before}, {"a": after}, {"a": axes})["a"]
+    assert motion.tilted_in_all_deg == pytest.approx(tilt, abs=1e-6)
+    assert motion.came_down_m == pytest.approx(before[2, 3] - after[2, 3])
+    assert [name for name in ("toppled", "fell", "left_table") if getattr(motion, name)] == verdict.split()
+
+
+@pytest.mark.parametrize(("height", "left"), [(0.002, False), (-0.002, True), (-0.6, True)])
+def test_what_has_its_centre_of_mass_below_the_top_has_left_the_table(height, left):
+    start = {"a": moved(np.eye(4), 0, 0, 0.04)}
+    after = {"a": moved(np.eye(4), 0, 0, height)}
+    assert motion_between(start, start, after, {})["a"].left_table is left
 
 
 def test_a_push_goes_for_the_object_whose_surface_is_nearest_to_the_contact():
@@ -100,9 +154,22 @@ def test_what_topples_or_falls_is_counted_once():
     scene = [state(20.0, False), state(21.0, False), state(90.0, True), state(95.0, True)]
     steps = disturbance_of_steps([scene], last_step=4)
     assert [figures.toppled for figures in steps] == [0, 1, 0, 0]
+    assert [figures.fell for figures in steps] == [0, 0, 0, 0]
     assert [figures.left_table for figures in steps] == [0, 0, 1, 0]
     assert disturbance_of_all([scene]).toppled == 1
     assert disturbance_of_all([scene]).tilt_max_deg == 95.0
+
+
+def test_what_falls_counts_once_and_no_more_where_it_topples_then():
+    def state(down, tilt=0.0, left=False):
+        return Disturbance("a", {"a": ObjectMotion(0.01, 0.0, tilt, left, down)})
+
+    def counts(*scene):
+        return [(figures.fell, figures.toppled) for figures in disturbance_of_steps([scene], len(scene))]
+
+    assert counts(state(0.01), state(0.03), state(0.05)) == [(0, 0), (1, 0), (0, 0)]
+    assert counts(state(0.03), state(0.03, 30.0), state(0.03, 10.0)) == [(1, 0), (0, 1), (0, 0)]
+    assert counts(state(0.7, left=True), state(0.7, left=True)) == [(0, 0), (0, 0)]
 
 
 def test_where_nothing_was_done_there_are_no_figures():

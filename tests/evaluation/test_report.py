@@ -80,9 +80,9 @@ def test_the_worst_scene_comes_first(text):
 
 
 def test_what_the_pushes_did_is_in_the_report(text):
-    assert rows(text, "1")[1] == ["2", "2.00", "1.00", "1.0", "0", "0"]
-    assert rows(text, "3")[1] == ["0", "–", "–", "–", "0", "0"]
-    assert rows(text, "**all**")[1] == ["4", "1.50", "2.00", "1.5", "0", "0"]
+    assert rows(text, "1")[1] == ["2", "2.00", "1.00", "1.0", "0", "0", "0"]
+    assert rows(text, "3")[1] == ["0", "–", "–", "–", "0", "0", "0"]
+    assert rows(text, "**all**")[1] == ["4", "1.50", "2.00", "1.5", "0", "0", "0"]
 
 
 def test_masks_while_things_move_are_in_the_report(text):

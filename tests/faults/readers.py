@@ -7,7 +7,7 @@ import os
 import random
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import cv2
@@ -19,6 +19,7 @@ from riseg_drake.app.output_folder import OutputFolder
 from riseg_drake.app.recorded_view import recorded_view
 from riseg_drake.app.scenario import Scenario, load_scenario
 from riseg_drake.app.scene_folder import is_finished, read_result
+from riseg_drake.evaluation.disturbance import ObjectMotion
 from riseg_drake.evaluation.report import report_text
 from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.camera import Intrinsics
@@ -262,7 +263,7 @@ def _results(place: Path) -> None:
     task = scene_tasks(Scenario(), "simulation", place / "evaluation", 1, 0, ablation=True)[0]
     task.folder.mkdir(parents=True)
     figures = score(np.eye(4, dtype=int), np.eye(4, dtype=int)).as_dict()
-    motion = {"moved_m": 0.01, "tilted_rad": 0.0, "toppled": False, "left_table": False}
+    motion = asdict(ObjectMotion(moved_m=0.01, tilted_deg=0.0))
     steps = [
         {"step": i, "scores": figures, "pushed": "a", "motions": {"a": motion}, "time_s": i} for i in (0, 1)
     ]

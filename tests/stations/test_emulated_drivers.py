@@ -3,6 +3,7 @@ import pytest
 from drake import lcmt_image_array, lcmt_panda_command, lcmt_panda_status, lcmt_viewer_draw
 from pydrake.lcm import DrakeLcm
 from pydrake.manipulation import PandaStatusReceiver
+from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.lcm import LcmSubscriberSystem
@@ -345,8 +346,11 @@ def test_the_middle_of_the_picture_is_what_the_simulated_station_sees(eye):
 def test_poses_are_where_the_objects_stand(eye):
     poses = decode_poses(eye.heard[POSE_CHANNEL][0])
     station = SimulatedStation(eye.station, seed=0)
-    np.testing.assert_allclose(poses.X_WB[1], station.objects[0].X_WB.GetAsMatrix4(), atol=1e-6)
-    assert poses.names == {1: station.objects[0].name}
+    (thing,) = station.objects
+    X_WBcm = thing.X_WB @ RigidTransform(thing.model.centre)
+    np.testing.assert_allclose(poses.X_WBcm[1], X_WBcm.GetAsMatrix4(), atol=1e-6)
+    np.testing.assert_array_equal(poses.axes[1], thing.model.axes)
+    assert poses.names == {1: thing.name}
 
 
 def test_labels_are_drawn_only_while_the_arm_stands(eye):

@@ -16,17 +16,19 @@ def test_labels_come_back_exactly_with_the_pictures_stamp():
     assert truth.time == 1_700_000_000.123
 
 
-def test_poses_come_back_by_object_id():
+def test_poses_and_axes_come_back_by_object_id():
     poses = {
         1: RigidTransform(RollPitchYaw(0.1, -0.4, 2.0), [0.5, -0.1, 0.02]),
         2: RigidTransform(RollPitchYaw(3.0, 0.0, 0.0), [0.4, 0.2, 0.03]),
     }
     names = {1: "orange", 2: "leopard"}
-    truth = decode_poses(lcmt_viewer_draw.decode(encode_poses(names, poses, STAMP).encode()))
+    axes = {1: np.eye(3), 2: np.zeros((0, 3))}
+    truth = decode_poses(lcmt_viewer_draw.decode(encode_poses(names, poses, axes, STAMP).encode()))
     assert truth.names == names
     assert truth.time == 1_700_000_000.123
-    for object_id, X_WB in poses.items():
-        np.testing.assert_allclose(truth.X_WB[object_id], X_WB.GetAsMatrix4(), atol=1e-6)
+    for object_id, X_WBcm in poses.items():
+        np.testing.assert_allclose(truth.X_WBcm[object_id], X_WBcm.GetAsMatrix4(), atol=1e-6)
+        np.testing.assert_array_equal(truth.axes[object_id], axes[object_id])
 
 
 def test_a_message_without_labels_is_refused():
