@@ -71,9 +71,9 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.app.graphics import NoGraphicsError
     from riseg_drake.app.hardware import HardwareError
     from riseg_drake.app.output_folder import OutputError
-    from riseg_drake.app.run import RunStoppedError
     from riseg_drake.app.scenario_file import ScenarioError
     from riseg_drake.app.scene_pool import PoolError
+    from riseg_drake.app.work_state import RunStoppedError
     from riseg_drake.evaluation.label_folders import LabelFolderError
     from riseg_drake.evaluation.true_things import ThingsError
     from riseg_drake.learned.model_error import ModelError

@@ -1,7 +1,9 @@
 """`riseg hand-eye`: is the camera where the scenario says? The arm moves over a scene that stands still."""
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,16 +14,17 @@ from riseg_drake.app.arm_travel import straight_motion, travel
 from riseg_drake.app.hardware import HardwareError, listening, wait_for_drivers
 from riseg_drake.app.output_folder import OutputFolder
 from riseg_drake.app.planned_speed import check_limits, planned_limits
-from riseg_drake.app.scenario import HARDWARE, load_scenario
+from riseg_drake.app.scenario import HARDWARE, Scenario, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.terminal_operator import TerminalOperator
+from riseg_drake.app.work_state import end_noted
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pushing.time_law import SpeedLimits
 from riseg_drake.recording.whole_file import write_png
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture, tip_pointing_down
 from riseg_drake.robot.silhouette import RobotSilhouette
 from riseg_drake.segmentation.above_table import objects_above_table
-from riseg_drake.segmentation.hand_eye import draw_flow_error, flow_errors, verdict
+from riseg_drake.segmentation.hand_eye import FlowError, draw_flow_error, flow_errors, verdict
 from riseg_drake.stations.command_process import CommandProcess
 from riseg_drake.stations.hardware import HardwareCameraConfig, HardwareStationConfig, newest_sight
 from riseg_drake.stations.lcm_reception import Reception
@@ -43,11 +46,57 @@ def hand_eye_command(
     check_limits(scenario)
     kinematics = PandaKinematics(config.panda)
     postures = _postures(kinematics, config)
-    limits = planned_limits(scenario)
-    folder = OutputFolder(
-        output or Path("out") / "hand_eye", "hand-eye", PARTS, {"state": "running"}, overwrite=overwrite
+    path = output or Path("out") / "hand_eye"
+    with (
+        OutputFolder(path, "hand-eye", PARTS, {"state": "running"}, overwrite=overwrite) as folder,
+        end_noted(lambda state, end: folder.note(state=state, end=end), lambda: f"no verdict in {folder.path}"),
+    ):
+        frames = _watched_moves(scenario, kinematics, postures, TerminalOperator(console, yes), console)
+        errors = flow_errors(frames)
+        if not errors:
+            raise HardwareError(
+                f"{len(frames)} pictures came, with too little texture or depth in them to compare; "
+                "put patterned things on the table"
+            )
+        with folder.writing():
+            for index, error in enumerate(errors[:: max(len(errors) // 5, 1)]):
+                write_png(folder.path / f"flow_{index}.png", draw_flow_error(error))
+        plane_W = objects_above_table(frames[-1], scenario.above_table).plane_W
+        folder.note(state="done", **_told(errors, plane_W, console))
+    console.print(f"arrows of both flows in {folder.path}: expected blue, observed orange")
+
+
+def _told(errors: Sequence[FlowError], plane_W: NDArray, console: Console) -> dict[str, Any]:
+    """Say what the flows and the table's plane [4] in the arm's frame show; returns it as figures."""
+    median, words = verdict(errors)
+    shift_u, shift_v = np.median([error.mean for error in errors], axis=0)
+    tilt = np.degrees(np.arccos(np.clip(plane_W[2], -1, 1)))
+    console.print(
+        f"hand-eye: observed and expected flow differ by {median:.2f} pixels (median of {len(errors)} pairs; "
+        f"shared by all pixels: {shift_u:+.2f}, {shift_v:+.2f}): {words}"
     )
-    operator = TerminalOperator(console, yes)
+    console.print(
+        f"table: {-1e3 * plane_W[3]:.1f} mm high and tilted by {tilt:.2f} degrees in the arm's base frame; "
+        "both should be near 0"
+    )
+    return {
+        "pairs": len(errors),
+        "median_px": round(median, 3),
+        "shift_px": [round(float(shift_u), 3), round(float(shift_v), 3)],
+        "table_height_mm": round(-1e3 * float(plane_W[3]), 2),
+        "table_tilt_deg": round(float(tilt), 3),
+    }
+
+
+def _watched_moves(
+    scenario: Scenario,
+    kinematics: PandaKinematics,
+    postures: Sequence[NDArray],
+    operator: TerminalOperator,
+    console: Console,
+) -> list[Frame]:
+    """The pictures that came while the arm went from posture to posture, joint angles [7], rad."""
+    config, limits = scenario.hardware, planned_limits(scenario)
     with listening(config, replayed=False, truth=False) as (reception, _):
         with console.status("waiting for arm and camera") as status:
             wait_for_drivers(reception, config, ready=True, say=status.update)
@@ -58,36 +107,7 @@ def hand_eye_command(
                 # The way there is not of interest; the moves after it are slow, for enough pictures.
                 plan = partial(_move, kinematics, q, limits, SLOWER if index else 1.0)
                 travel(plan, commands, reception, operator, camera.look if index else lambda: None)
-    errors = flow_errors(camera.frames)
-    if not errors:
-        raise HardwareError(
-            f"{len(camera.frames)} pictures came, with too little texture or depth in them to compare; "
-            "put patterned things on the table"
-        )
-    median, words = verdict(errors)
-    shift_u, shift_v = np.median([error.mean for error in errors], axis=0)
-    with folder.writing():
-        for index, error in enumerate(errors[:: max(len(errors) // 5, 1)]):
-            write_png(folder.path / f"flow_{index}.png", draw_flow_error(error))
-    plane_W = objects_above_table(camera.frames[-1], scenario.above_table).plane_W
-    tilt = np.degrees(np.arccos(np.clip(plane_W[2], -1, 1)))
-    console.print(
-        f"hand-eye: observed and expected flow differ by {median:.2f} pixels (median of {len(errors)} pairs; "
-        f"shared by all pixels: {shift_u:+.2f}, {shift_v:+.2f}): {words}"
-    )
-    console.print(
-        f"table: {-1e3 * plane_W[3]:.1f} mm high and tilted by {tilt:.2f} degrees in the arm's base frame; "
-        "both should be near 0"
-    )
-    folder.note(
-        state="done",
-        pairs=len(errors),
-        median_px=round(median, 3),
-        shift_px=[round(float(shift_u), 3), round(float(shift_v), 3)],
-        table_height_mm=round(-1e3 * float(plane_W[3]), 2),
-        table_tilt_deg=round(float(tilt), 3),
-    )
-    console.print(f"arrows of both flows in {folder.path}: expected blue, observed orange")
+    return camera.frames
 
 
 class _Collector:

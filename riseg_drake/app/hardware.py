@@ -19,12 +19,13 @@ from riseg_drake.app.dry_run import DryRun
 from riseg_drake.app.interactions import Listener, Progress, TruthSource, WallClock, interactions
 from riseg_drake.app.output import RECORDING, RunFolder, Step
 from riseg_drake.app.planned_speed import check_limits, planned_limits
-from riseg_drake.app.run import Narrator, RunStoppedError, report, state_of
+from riseg_drake.app.run import Narrator, report, state_of
 from riseg_drake.app.run_recording import recording_of
 from riseg_drake.app.scenario import HARDWARE, Scenario, load_scenario, scenario_name
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.terminal_operator import TerminalOperator
 from riseg_drake.app.truth_reception import TruthReception
+from riseg_drake.app.work_state import RunStoppedError
 from riseg_drake.pushing.push import Push
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture
 from riseg_drake.robot.supervisor import MOVE

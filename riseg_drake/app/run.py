@@ -3,7 +3,7 @@
 import resource
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
@@ -18,15 +18,13 @@ from riseg_drake.app.diagram import WiredDiagram, make_diagram
 from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.interactions import Listener, Progress, interactions, simulated_truth
 from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step, stage_figures
-from riseg_drake.app.output_folder import OutputError
 from riseg_drake.app.run_recording import recording_of
 from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
 from riseg_drake.app.tables import score_table, stage_table
+from riseg_drake.app.work_state import end_noted
 from riseg_drake.evaluation.in_motion import pooled
 from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.rgbd import Frame
-from riseg_drake.host.processes import undisturbed
-from riseg_drake.host.terminal import one_line
 from riseg_drake.recording.whole_file import write_text
 from riseg_drake.systems.mask_refiner import NO_REFINED_MASK, RefinedMask
 from riseg_drake.systems.stage_clock import StageClock
@@ -149,10 +147,6 @@ def _objects(number: int) -> str:
     return "1 object" if number == 1 else f"{number} objects"
 
 
-class RunStoppedError(RuntimeError):
-    """A run that did not come to its end; says in one line why."""
-
-
 @contextmanager
 def state_of(folder: RunFolder, progress: Progress, steps: list[Step]) -> Iterator[None]:
     """Enter in the summary how the run ended, also where it was stopped or failed.
@@ -173,20 +167,11 @@ def state_of(folder: RunFolder, progress: Progress, steps: list[Step]) -> Iterat
             peak_memory_mb=peak_memory_mb(),
         )
 
-    try:
+    def left() -> str:
+        return f"{len(steps)} finished step{'' if len(steps) == 1 else 's'} in {folder.path}"
+
+    with end_noted(finish, left):
         yield
-    except KeyboardInterrupt:
-        with undisturbed():
-            finish("interrupted", "stopped by the user")
-        finished = f"{len(steps)} finished step{'' if len(steps) == 1 else 's'}"
-        raise KeyboardInterrupt(f"{finished} in {folder.path}") from None
-    except RunStoppedError as stop:
-        finish("stopped", str(stop))
-        raise
-    except Exception as error:
-        with suppress(OutputError):  # where the disk is full
-            finish("failed", one_line(error))
-        raise
     finish("done", progress.end)
 
 

@@ -3,7 +3,7 @@
 import json
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import asdict, astuple, dataclass, field
 from pathlib import Path
 from time import perf_counter
@@ -14,17 +14,16 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from riseg_drake.app.output import RECORDING, confidence_figures, stage_figures
-from riseg_drake.app.output_folder import OutputError
 from riseg_drake.app.recorded_view import RecordedView, recorded_view
 from riseg_drake.app.replay import Replay
 from riseg_drake.app.run import peak_memory_mb
 from riseg_drake.app.scenario import Scenario, load_scenario
 from riseg_drake.app.segment_folder import SegmentFolder
 from riseg_drake.app.tables import score_table, stage_table
+from riseg_drake.app.work_state import end_noted
 from riseg_drake.evaluation.scores import FIGURES, Scores, score
 from riseg_drake.geometry.plane import NoPlaneError
 from riseg_drake.host.files import MOST_SETTINGS, FileError, check_inside, read_text
-from riseg_drake.host.processes import undisturbed
 from riseg_drake.host.terminal import one_line
 from riseg_drake.recording import layout
 from riseg_drake.recording.layout import LeftOut, RecordedFrame, RecordingError
@@ -241,16 +240,8 @@ def _state_of(folder: SegmentFolder, result: SegmentResult, clock: StageClock) -
             peak_memory_mb=peak_memory_mb(),
         )
 
-    try:
+    with end_noted(finish, lambda: f"{_masks(result.frames)} in {folder.path}"):
         yield
-    except KeyboardInterrupt:
-        with undisturbed():
-            finish("interrupted", "stopped by the user")
-        raise KeyboardInterrupt(f"{_masks(result.frames)} in {folder.path}") from None
-    except Exception as error:
-        with suppress(OutputError):  # where the disk is full
-            finish("failed", one_line(error))
-        raise
     finish("done", "all frames were read")
 
 

@@ -8,7 +8,7 @@ from typing import TextIO
 
 from rich.console import Console
 
-from riseg_drake.app.run import RunStoppedError
+from riseg_drake.app.work_state import RunStoppedError
 from riseg_drake.pushing.push import Push
 from riseg_drake.systems.arm_motion import Permission
 

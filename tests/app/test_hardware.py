@@ -14,11 +14,12 @@ from riseg_drake.app.interactions import Progress
 from riseg_drake.app.output import RunFolder
 from riseg_drake.app.output_folder import SUMMARY
 from riseg_drake.app.planned_speed import check_limits, planned_limits, push_parameters
-from riseg_drake.app.run import RunStoppedError, state_of
+from riseg_drake.app.run import state_of
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.stream_bench import is_even
 from riseg_drake.app.truth_reception import TruthReception
+from riseg_drake.app.work_state import RunStoppedError
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pushing.time_law import SpeedLimits
 from riseg_drake.robot.kinematics import READY, PandaKinematics, observation_posture, tip_pointing_down
