@@ -5,7 +5,6 @@
 writes one folder a toy; without OUTPUT, beside this file. The same program writes the same bytes again.
 """
 
-import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,9 +15,13 @@ from riseg_drake.models.objects.outlines import trace
 from riseg_drake.models.objects.solids import Mesh, mass_properties, solid
 from riseg_drake.models.objects.texture import painted, plain_obj, write_png
 from riseg_drake.models.objects.toys import TOYS, Toy
+from riseg_drake.models.sdf import collision, convex_mesh, fresh_folder, make_all, sdf
 
 TEXTURE_RESOLUTION = 0.36  # mm a texel: half of what a pixel sees from 0.45 m
 MM = 1e-3
+STIFFNESS = """
+          <drake:point_contact_stiffness>2e4</drake:point_contact_stiffness>
+          <drake:hunt_crossley_dissipation>2.0</drake:hunt_crossley_dissipation>"""
 
 
 @dataclass(frozen=True)
@@ -32,9 +35,7 @@ class Body:
 
 def make_toy(toy: Toy, folder: Path) -> None:
     """Write one toy's files into `folder`, which is made if need be."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for stale in folder.glob(f"{toy.name}*"):
-        stale.unlink()
+    fresh_folder(folder, toy.name)
     rng = np.random.default_rng(sum(toy.name.encode()))
     loops = trace(toy.drawing)
     mesh = solid(loops, toy.profile, rng)
@@ -65,57 +66,24 @@ def _textured_obj(name: str, mesh: Mesh, vertices: NDArray, chart: NDArray) -> s
 
 
 def _sdf(toy: Toy, body: Body, foot_centres: NDArray, piece_count: int) -> str:
-    i = body.inertia
-    surface = f"""<drake:proximity_properties>
-          <drake:point_contact_stiffness>2e4</drake:point_contact_stiffness>
-          <drake:hunt_crossley_dissipation>2.0</drake:hunt_crossley_dissipation>
-          <drake:mu_static>{toy.friction}</drake:mu_static>
-          <drake:mu_dynamic>{toy.friction}</drake:mu_dynamic>
-        </drake:proximity_properties>"""
-    collisions = [
-        f"""
-      <collision name="foot_{k}">
-        <pose>{x * MM:.5f} {y * MM:.5f} {z * MM:.5f} 0 0 0</pose>
-        <geometry><sphere><radius>{FOOT_RADIUS * MM:.5f}</radius></sphere></geometry>
-        {surface}
-      </collision>"""
+    feet_and_pieces = {
+        f"foot_{k}": f"""<pose>{x * MM:.5f} {y * MM:.5f} {z * MM:.5f} 0 0 0</pose>
+        <geometry><sphere><radius>{FOOT_RADIUS * MM:.5f}</radius></sphere></geometry>"""
         for k, (x, y, z) in enumerate(foot_centres)
-    ] + [
-        f"""
-      <collision name="piece_{k}">
-        <geometry><mesh><uri>{toy.name}_piece_{k}.obj</uri><drake:declare_convex/></mesh></geometry>
-        {surface}
-      </collision>"""
-        for k in range(piece_count)
-    ]
-    return f"""<?xml version="1.0"?>
-<sdf version="1.9" xmlns:drake="http://drake.mit.edu">
-  <model name="{toy.name}">
-    <link name="{toy.name}">
-      <inertial>
-        <pose>{body.centre[0]:.6f} {body.centre[1]:.6f} {body.centre[2]:.6f} 0 0 0</pose>
-        <mass>{body.mass:.5f}</mass>
-        <inertia>
-          <ixx>{i[0, 0]:.6e}</ixx><iyy>{i[1, 1]:.6e}</iyy><izz>{i[2, 2]:.6e}</izz>
-          <ixy>{i[0, 1]:.6e}</ixy><ixz>{i[0, 2]:.6e}</ixz><iyz>{i[1, 2]:.6e}</iyz>
-        </inertia>
-      </inertial>
-      <visual name="visual">
-        <geometry><mesh><uri>{toy.name}.obj</uri></mesh></geometry>
-      </visual>{"".join(collisions)}
-    </link>
-  </model>
-</sdf>
-"""
+    } | {f"piece_{k}": convex_mesh(f"{toy.name}_piece_{k}.obj") for k in range(piece_count)}
+    return sdf(
+        toy.name,
+        mass=f"{body.mass:.5f}",
+        centre=body.centre,
+        inertia=body.inertia,
+        visual=f"{toy.name}.obj",
+        collisions=[collision(name, shape, toy.friction, STIFFNESS) for name, shape in feet_and_pieces.items()],
+    )
 
 
 def main() -> None:
     """Command line: draw every toy."""
-    parser = argparse.ArgumentParser(description="Draw the toys: meshes, textures, SDF.")
-    parser.add_argument("output", nargs="?", type=Path, default=Path(__file__).parent)
-    output = parser.parse_args().output
-    for toy in TOYS:
-        make_toy(toy, output / toy.name)
+    make_all(TOYS, make_toy, Path(__file__).parent, "Draw the toys: meshes, textures, SDF.")
 
 
 if __name__ == "__main__":
