@@ -84,6 +84,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.stations.lcm_images import ImageError
     from riseg_drake.stations.misbehaviour import WordError
     from riseg_drake.stations.object_models import SceneError
+    from riseg_drake.stations.physics import PhysicsError
 
     return (
         OSError,
@@ -92,6 +93,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
         CameraDiedError,
         ScenarioError,
         SceneError,
+        PhysicsError,
         LabelFolderError,
         ThingsError,
         RecordingError,

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ from riseg_drake.pushing.decision import UNDECIDED, Decision, Ending
 from riseg_drake.pushing.push import NO_PUSH, ArmPhase, Push
 from riseg_drake.segmentation.segmentation import Segmentation
 from riseg_drake.segmentation.untouched import untouched_clusters
+from riseg_drake.stations.physics import advance
 from riseg_drake.systems.stage_clock import StageClock
 
 Listener = Callable[[Frame, Context], None]
@@ -94,6 +95,7 @@ def interactions(
     It ends when the arm is done (a_i = null, or enough pushes were made), or when `longest` seconds have
     passed; `progress.end` and `progress.decision` say which. At wall time also when somebody else has set
     `progress.end`; how things stand then is yielded, too. The truth is that of the simulation if not given.
+    Raises PhysicsError where a simulation cannot go on.
     """
     clock.watch(wired.stages)
     simulator = Simulator(wired.diagram)
@@ -102,12 +104,13 @@ def interactions(
     simulator.set_monitor(news.look)
     book = _Book(wired, context, clock, truth or simulated_truth(wired))
     start = wall.start if wall else 0.0
+    go_on = simulator.AdvanceTo if wall else partial(advance, simulator)  # a real arm has no physics to fail
     if wall:
         context.SetTime(start)
         simulator.set_target_realtime_rate(1.0)
     simulator.Initialize()
     while not progress.end:  # line 4
-        simulator.AdvanceTo(start + longest)  # lines 5 to 8, up to the next mask or the arm's next phase
+        go_on(start + longest)  # lines 5 to 8, up to the next mask or the arm's next phase
         if news.mask_is_new:
             news.mask_is_new = False
             progress.frames += 1

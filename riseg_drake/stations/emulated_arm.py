@@ -8,6 +8,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from riseg_drake.stations.panda_driver import PandaDriver, PandaDriverConfig
 from riseg_drake.stations.panda_robot import MOVE
+from riseg_drake.stations.physics import advance
 from riseg_drake.stations.simulated import SimulatedStationConfig, add_world, start_position
 
 TICK_US = 1000
@@ -64,7 +65,7 @@ class EmulatedArm:
         if self._ticks % self._ticks_a_step:
             return
         self._desired.GetMutableData().get_mutable_value().SetFromVector(self._desired_state())
-        self._simulator.AdvanceTo(1e-6 * TICK_US * self._ticks)
+        advance(self._simulator, 1e-6 * TICK_US * self._ticks)
         port = self.plant.get_generalized_contact_forces_output_port(self._arm)
         self._external += _FILTER * (port.Eval(self._context) - self._external)
 

@@ -159,6 +159,28 @@ def test_a_run_that_is_stopped_leaves_whole_steps_and_exit_code_130(
     assert error == f"riseg: stopped; 1 finished step in {tmp_path / 'out'}\n"
 
 
+def test_a_run_whose_contact_solver_fails_leaves_whole_steps_and_one_line(
+    small_scenario, tmp_path, monkeypatch, capsys
+):
+    def break_physics(self, frame, context):
+        if frame.sequence == 20:  # after step 0, before step 1
+            plant = self._wired.diagram.GetSubsystemByName("station").plant
+            state = plant.GetMyMutableContextFromRoot(context).get_mutable_discrete_state(0)
+            state.get_mutable_value()[-1] = np.nan  # a velocity
+
+    monkeypatch.setattr(run_module.RefinedSteps, "look", break_physics)
+    assert main(["run", str(small_scenario), "--record", "--output", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert error.startswith("riseg: the simulation failed after ")
+    assert "another seed or a shorter station.time_step may help" in error
+    content = summary(tmp_path / "out")
+    assert (content["state"], f"riseg: {content['end']}\n") == ("failed", error)
+    assert [step["step"] for step in content["steps"]] == [0]
+    assert not list((tmp_path / "out").rglob("*.unfinished"))
+    assert len(list(RecordingReader(tmp_path / "out" / "recording"))) in (20, 21)
+
+
 def test_the_same_seed_gives_the_same_bytes(finished, small_scenario, tmp_path):
     assert main(["run", str(small_scenario), "--seed", "1", "--output", str(tmp_path / "again")]) == 0
     for name in ("color.png", "depth.png", "mask.png", "ground_truth.png"):
