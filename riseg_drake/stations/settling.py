@@ -12,11 +12,16 @@ from pydrake.systems.framework import DiagramBuilder
 
 from riseg_drake.stations.contact import let_touch, set_contact_model
 from riseg_drake.stations.object_models import ObjectModel
+from riseg_drake.stations.physics import advance
 from riseg_drake.stations.placed_object import PlacedObject, add_scene
 
 TABLE_FRICTION = CoulombFriction(0.5, 0.5)
 STILL = (2e-4, 2e-3)
 """m/s and rad/s below which an object is at rest."""
+TREMBLING = (1e-3, 1e-2)
+"""m/s and rad/s above which an object does not stay at rest: some piles tremble, and creep by it."""
+STAYING = 1.0
+"""s for which a pile must stay at rest."""
 STEP_AT_POINTS, STEP_OVER_AREAS = 0.002, 0.004
 """s; contact over areas is stiff in no direction, and costs more a step."""
 LONGEST = 3.0
@@ -37,7 +42,10 @@ TABLE = 0
 
 
 class SettlingTable:
-    """A table with objects on it, which are let go. The same objects give the same, to the last bit."""
+    """A table with objects on it, which are let go. The same objects give the same, to the last bit.
+
+    Letting go raises PhysicsError where the simulation cannot go on.
+    """
 
     def __init__(self, placed: Sequence[PlacedObject], centre_W: Sequence[float]):
         self._placed = list(placed)
@@ -74,14 +82,27 @@ class SettlingTable:
         """Let go until all are at rest, or `longest` s are over; whether they are at rest."""
         start = self._simulator.get_context().get_time()
         for time in np.arange(0.2, longest, 0.1):
-            self._simulator.AdvanceTo(start + time)
-            velocities = [body.EvalSpatialVelocityInWorld(self._context) for body in self._bodies]
-            if all(
-                np.linalg.norm(V.translational()) < STILL[0] and np.linalg.norm(V.rotational()) < STILL[1]
-                for V in velocities
-            ):
+            advance(self._simulator, start + time)
+            if self._are_slower(*STILL):
                 return True
         return False
+
+    def stay(self, seconds: float) -> bool:
+        """Let go for so long; whether all stay at rest from 0.2 s on, looked at ten times a second."""
+        start = self._simulator.get_context().get_time()
+        for time in np.arange(0.2, seconds + 0.05, 0.1):
+            advance(self._simulator, start + time)
+            if not self._are_slower(*TREMBLING):
+                return False
+        return True
+
+    def _are_slower(self, speed: float, turning: float) -> bool:
+        """Whether all objects are slower than some m/s and rad/s."""
+        velocities = [body.EvalSpatialVelocityInWorld(self._context) for body in self._bodies]
+        return all(
+            np.linalg.norm(V.translational()) < speed and np.linalg.norm(V.rotational()) < turning
+            for V in velocities
+        )
 
     def objects(self) -> list[PlacedObject]:
         """The objects where they are now."""
@@ -130,7 +151,9 @@ def lay_pile(
         table.settle(LAYING)
     if not table.settle(LONGEST_OF_A_PILE) or not is_pile(table.touching(), len(models)):
         return None
-    return _centred(table.objects(), centre_W)
+    heap = _centred(table.objects(), centre_W)
+    # Still at one moment is what trembles, too, where it turns. A station's plant begins with no velocities.
+    return heap if SettlingTable(heap, centre_W).stay(STAYING) else None
 
 
 def is_pile(touching: set[frozenset[int]], count: int) -> bool:
