@@ -140,21 +140,24 @@ def carry_bodies(
     motions = len(bodies.motions_K)
     code, label = np.unique(bodies.body * motions + bodies.motion, return_inverse=True)
     rigid = np.stack(np.divmod(code, motions))
-    hidden = np.flatnonzero(np.bincount(remembered.ravel()))
-    number_of = np.zeros(int(hidden.max(initial=0)) + 1, np.uint16)
-    number_of[hidden] = np.arange(len(hidden)) + 1 + len(code)
-    number_of[0] = 0
-    number = number_of[remembered]
-    ids = np.concatenate([[0], np.where(rigid[0] > 0, rigid[0], UNKNOWN), hidden]).astype(np.uint16)
+    hiding = remembered > 0
+    hidden, order = np.unique(remembered[hiding], return_inverse=True)
+    number = np.zeros_like(remembered)
+    number[hiding] = order + 1 + len(code)
+    id_of = np.full(65536, UNKNOWN)
+    ids = np.concatenate([[0], np.where(rigid[0] > 0, rigid[0], UNKNOWN), hidden])
+    id_of[: len(ids)] = ids
     moves = {i + 1: bodies.motions_K[g] for i, g in enumerate(rigid[1]) if g > 0}
-    carried = _carry(belief, label + 1, moves, frame, above, number)
-    found = np.where(carried == UNKNOWN, UNKNOWN, ids[np.where(carried == UNKNOWN, 0, carried)])
+    found = id_of.take(_carry(belief, label + 1, moves, frame, above, number))
     blind = (frame.depth == 0) & ~frame.robot & ~above.mask
     if np.count_nonzero(blind) < _BLIND * frame.depth.size:
         return found
     # Too near for the camera to measure: the depth that the keyframe has, moved, must do.
     image = belief.keyframe.image_of((label + 1).astype(np.uint16))
-    return np.where(blind, ids[draw_labels(belief.keyframe.frame, frame, image, moves)], found)
+    drawn = draw_labels(belief.keyframe.frame, frame, image, moves)
+    blind = np.flatnonzero(blind & (drawn > 0))
+    found.ravel()[blind] = id_of.take(drawn.ravel().take(blind))
+    return found
 
 
 def next_belief(

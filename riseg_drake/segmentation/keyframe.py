@@ -101,7 +101,7 @@ class Keyframe(Immutable):
         """A value for each superpixel [N] as an image [H, W], `outside` where there is none."""
         image = np.full(self.frame.depth.shape, outside, values.dtype)
         label = self.superpixels.label
-        image[self.region] = np.append(values, np.array(outside, values.dtype))[label]
+        image[self.region] = np.append(values, np.array(outside, values.dtype)).take(label)
         return image
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import Intrinsics, bounding_region, project, rays
-from riseg_drake.geometry.nearest import nearest_values
+from riseg_drake.geometry.nearest import nearest_places
 from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.geometry.se3 import inverse, move_points
 from riseg_drake.segmentation.above_table import AboveTable
@@ -93,27 +93,25 @@ def draw_labels(
     moved, the motion [4, 4] in C0.
     """
     drawn = np.zeros_like(label_0)
-    nearest = np.full(label_0.shape, np.inf, np.float32)
+    nearest = np.zeros(label_0.shape, np.float32)  # 1 / depth of what is drawn
     X_C1C0 = inverse(current.X_WC) @ reference.X_WC
-    shown = (label_0 > 0) & (reference.depth > 0)
-    p_C0Q = rays(reference.intrinsics)[shown].astype(float) * reference.depth[shown][:, None]
-    owner = label_0[shown]
+    surface = surface_pixels(label_0 > 0, reference.depth, reference.intrinsics)
+    owner = label_0[*surface.pixel]
     for a in np.flatnonzero(np.bincount(owner)):
-        p_C1Q = move_points(X_C1C0 @ motion_of.get(int(a), np.eye(4)), p_C0Q[owner == a])
-        (row, column), inside = (x.T for x in pixels_of(p_C1Q, current.intrinsics))
-        if not inside.any():
+        own = surface.subset(np.flatnonzero(owner == a))
+        sought = seek(own, X_C1C0 @ motion_of.get(int(a), np.eye(4)))
+        inside = np.flatnonzero(sought.inside(label_0.shape))
+        if not len(inside):
             continue
-        row, column, z = row[inside], column[inside], p_C1Q[inside, 2].astype(np.float32)
+        row, column = (np.rint(x.ravel()[inside]).astype(np.intp) for x in (sought.v, sought.u))
         top, left = (max(0, int(x.min()) - _CLOSE) for x in (row, column))
         region = np.s_[top : int(row.max()) + _CLOSE + 1, left : int(column.max()) + _CLOSE + 1]
         spots = np.zeros(drawn[region].shape, np.float32)
-        spots[row - top, column - left] = 1 / z
+        spots[row - top, column - left] = 1 / sought.depth[inside]
         # Nearer than it was, a thing is larger: its points leave gaps.
         spots = cv2.morphologyEx(spots, cv2.MORPH_CLOSE, np.ones((_CLOSE, _CLOSE), np.uint8))
-        with np.errstate(divide="ignore"):
-            z_1 = 1 / spots
-        front = (spots > 0) & (z_1 < nearest[region])
-        drawn[region][front], nearest[region][front] = a, z_1[front]
+        np.copyto(drawn[region], a, where=spots > nearest[region], casting="unsafe")
+        np.maximum(nearest[region], spots, out=nearest[region])
     return drawn
 
 
@@ -132,16 +130,18 @@ def nearest_label(
     empty = inside[region] & (old == 0)
     filled = np.where(empty, UNKNOWN, old)
     if empty.any() and old.any():
-        nearest, distance = nearest_values(old, old > 0)
-        near = empty & (distance <= reach)
-        broad = near & (cv2.morphologyEx(empty.view(np.uint8), cv2.MORPH_OPEN, _RIM) > 0)
+        places, distance = nearest_places(old > 0)
+        near = np.flatnonzero(empty & (distance <= reach))
+        nearest = places.of(near)
+        broad = cv2.morphologyEx(empty.view(np.uint8), cv2.MORPH_OPEN, _RIM).ravel()[near] > 0
         if broad.any():
             z = depth[region]
             # On its own rim a thing has no depth, or that of what is behind it.
             front = cv2.erode(np.where((old > 0) & (z > 0), z, np.float32(np.inf)), _RIM)
-            z_labelled, _ = nearest_values(front, old > 0)
-            near &= ~(broad & (z > 0) & np.isfinite(z_labelled) & (np.abs(z - z_labelled) > _DEPTH_AGREES))
-        filled[near] = nearest[near]
+            z_labelled, z = front.ravel()[nearest], z.ravel()[near]
+            other = broad & (z > 0) & np.isfinite(z_labelled) & (np.abs(z - z_labelled) > _DEPTH_AGREES)
+            near, nearest = near[~other], nearest[~other]
+        filled.ravel()[near] = old.ravel()[nearest]
     out[region] = filled
     return out
 

@@ -75,7 +75,8 @@ def surface_pixels(
 ) -> SurfacePixels:
     """The pixels of a mask [H, W] that have depth [H, W] (m, 0 = none), row by row."""
     index = np.flatnonzero(mask & (depth > 0))
-    pixel = np.stack(np.divmod(index, depth.shape[1]))
+    row = index // depth.shape[1]
+    pixel = np.stack([row, index - row * depth.shape[1]])
     return _rows_of_pixels(pixel, depth.ravel()[index], intrinsics)
 
 
