@@ -68,14 +68,12 @@ def carry_labels(
             moves = np.zeros(65536, bool)
             moves[ids] = True
         found, apart = _look_up(surface, inverse(pair.X_C1C0 @ motion), label_0, pair.reference)
-        better = (apart < gap) & moves[found]
-        label[better] = found[better]
-        gap[better] = apart[better]
+        better = (apart < gap) & moves.take(found)
+        np.copyto(label, found, where=better)
+        np.copyto(gap, apart, where=better)
 
-    v, u = surface.pixel
-    remembered = remembered_1[v, u]
     out = np.zeros(above_1.mask.shape, np.uint16)
-    out[v, u] = np.where(label > 0, label, remembered)
+    out.ravel()[surface.index] = np.where(label > 0, label, remembered_1.ravel().take(surface.index))
     return nearest_label(
         out, above_1.mask, current.depth, _REACH * above_1.pixels_per_metre(current.intrinsics)
     )
@@ -96,7 +94,7 @@ def draw_labels(
     nearest = np.zeros(label_0.shape, np.float32)  # 1 / depth of what is drawn
     X_C1C0 = inverse(current.X_WC) @ reference.X_WC
     surface = surface_pixels(label_0 > 0, reference.depth, reference.intrinsics)
-    owner = label_0[*surface.pixel]
+    owner = label_0.ravel().take(surface.index)
     for a in np.flatnonzero(np.bincount(owner)):
         own = surface.subset(np.flatnonzero(owner == a))
         sought = seek(own, X_C1C0 @ motion_of.get(int(a), np.eye(4)))

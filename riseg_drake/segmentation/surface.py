@@ -1,12 +1,13 @@
 """Some pixels of one view, ready to be sought in another one: under this motion, and that, and that."""
 
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.geometry.camera import Intrinsics, pixel_grid
 from riseg_drake.geometry.rgbd import Immutable
 from riseg_drake.segmentation.expected_flow import pixel_projection
 
@@ -18,8 +19,8 @@ _ROW = 256
 class SurfacePixels(Immutable):
     """N pixels of a view C0 that all have depth."""
 
-    pixel: NDArray[np.intp]
-    """[2, N], (v, u)."""
+    index: NDArray[np.intp]
+    """[N], the pixels' places in the image, row by row."""
     depth: NDArray[np.float32]
     """[N], m."""
     intrinsics: Intrinsics
@@ -30,9 +31,14 @@ class SurfacePixels(Immutable):
         """The number of pixels N."""
         return len(self.depth)
 
+    @cached_property
+    def pixel(self) -> NDArray[np.intp]:
+        """[2, N], (v, u)."""
+        return np.stack(np.divmod(self.index, self.intrinsics.width))
+
     def subset(self, which: NDArray[np.intp]) -> "SurfacePixels":
         """Some of the pixels, by their numbers [N]."""
-        return _rows_of_pixels(self.pixel[:, which], self.depth[which], self.intrinsics)
+        return _rows_of_pixels(self.index.take(which), self.depth.take(which), self.intrinsics)
 
 
 @dataclass(frozen=True)
@@ -75,19 +81,24 @@ def surface_pixels(
 ) -> SurfacePixels:
     """The pixels of a mask [H, W] that have depth [H, W] (m, 0 = none), row by row."""
     index = np.flatnonzero(mask & (depth > 0))
-    row = index // depth.shape[1]
-    pixel = np.stack([row, index - row * depth.shape[1]])
-    return _rows_of_pixels(pixel, depth.ravel()[index], intrinsics)
+    return _rows_of_pixels(index, depth.ravel().take(index), intrinsics)
 
 
 def _rows_of_pixels(
-    pixel: NDArray[np.intp], depth: NDArray[np.float32], intrinsics: Intrinsics
+    index: NDArray[np.intp], depth: NDArray[np.float32], intrinsics: Intrinsics
 ) -> SurfacePixels:
     count = len(depth)
     homogeneous = np.ones((4, -(-max(count, 1) // _ROW) * _ROW), np.float32)
-    if count:
-        homogeneous[0, :count], homogeneous[1, :count], homogeneous[3, :count] = pixel[1], pixel[0], 1 / depth
-    return SurfacePixels(pixel, depth, intrinsics, homogeneous)
+    for row, places in zip(homogeneous, _places(*intrinsics.shape), strict=False):
+        row[:count] = places.take(index)
+    np.divide(1, depth, out=homogeneous[3, :count])
+    return SurfacePixels(index, depth, intrinsics, homogeneous)
+
+
+@lru_cache(maxsize=8)
+def _places(height: int, width: int) -> NDArray[np.float32]:
+    """u and v [2, H * W] of all pixels, row by row."""
+    return np.ascontiguousarray(pixel_grid(height, width).reshape(-1, 2).T)
 
 
 def seek(pixels: SurfacePixels, X_C1C0: NDArray[np.float64], depth_factor: float = 1.0) -> Sought:
