@@ -91,7 +91,8 @@ class Comparison(Immutable):
     def leaves(self) -> NDArray[np.float64]:
         """[N], share of its witnesses that the camera's own motion takes out of the image."""
         sought = seek(self.keyframe.witnesses, self.X_C1K)
-        return self.keyframe.share_of_witnesses(~sought.inside(self.frame.intrinsics.shape))
+        outside = np.flatnonzero(~sought.inside(self.frame.intrinsics.shape))
+        return self.keyframe.share_of_witnesses(outside)
 
     @property
     def depth_error(self) -> float:

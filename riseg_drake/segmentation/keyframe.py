@@ -88,9 +88,9 @@ class Keyframe(Immutable):
         """[N], how many witnesses each superpixel has."""
         return np.bincount(self.owner, minlength=self.count)
 
-    def share_of_witnesses(self, which: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Of each superpixel's witnesses the share [N] that is among some of them [W]."""
-        return np.bincount(self.owner, which, self.count) / np.maximum(self.witness_count, 1)
+    def share_of_witnesses(self, which: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Of each superpixel's witnesses the share [N] that is among some of them, by their numbers."""
+        return np.bincount(self.owner.take(which), minlength=self.count) / np.maximum(self.witness_count, 1)
 
     @property
     def pixels_per_metre(self) -> float:

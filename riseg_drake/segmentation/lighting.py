@@ -14,7 +14,7 @@ def gray_costs(
     after: NDArray[np.float32],
     per_variance: NDArray,
     piece: NDArray[np.intp],
-    count: int,
+    pixels: NDArray[np.intp],
     cost_max: float,
     certainty: float,
 ) -> NDArray[np.float32]:
@@ -24,8 +24,8 @@ def gray_costs(
         before: [N], gray values at t-1.
         after: [N], those found at t; NaN where none was.
         per_variance: [N], 1 / variance of the difference, where they belong together.
-        piece: [N], 0..count-1, each changes its light as one.
-        count: number of pieces.
+        piece: [N], 0..P-1, each changes its light as one.
+        pixels: [P], how many there are of each piece.
         cost_max: squared residuals count no more than that.
         certainty: 1 / variance of the factor by which a piece's light changes, in the measure of the squared
             residuals of all of its pixels; what that costs is shared out among them.
@@ -33,22 +33,32 @@ def gray_costs(
     Returns:
         [N]; NaN where there is nothing to compare.
     """
-    ceiling = np.float32(cost_max)
-    cost = np.minimum((after - before) ** 2 * per_variance, ceiling)
-    compared = np.isfinite(cost)
-    pixels = np.bincount(piece, compared, count)
-    total = np.bincount(piece, np.where(compared, cost, 0), count)
-    mine = np.flatnonzero((total > 0.5 * pixels)[piece] & compared)
+    ceiling, count = np.float32(cost_max), len(pixels)
+    cost = np.square(after - before)
+    cost *= per_variance
+    np.minimum(cost, ceiling, out=cost)
+    unknown = np.isnan(cost)
+    lost = np.flatnonzero(unknown)
+    pixels = pixels - np.bincount(piece.take(lost), minlength=count)
+    cost[lost] = 0
+    total = np.bincount(piece, cost, count)
+    cost[lost] = np.nan
+    mine = np.flatnonzero((total > 0.5 * pixels).take(piece) & ~unknown)
     if not len(mine):
         return cost
-    piece, before, after, weight = piece[mine], before[mine], after[mine], per_variance[mine]
+    piece, before, after, weight = (x.take(mine) for x in (piece, before, after, per_variance))
     # The likeliest factor, by least squares.
-    products = np.bincount(piece, weight * before * after, count) + certainty
-    factor = (products / (np.bincount(piece, weight * before**2, count) + certainty)).astype(np.float32)
+    weighted = weight * before
+    products = np.bincount(piece, weighted * after, count) + certainty
+    factor = (products / (np.bincount(piece, weighted * before, count) + certainty)).astype(np.float32)
     price = (certainty * (factor - 1) ** 2 / np.maximum(pixels, 1)).astype(np.float32)
-    by = factor[piece]
     # With it the noise of the first image is amplified.
-    other = np.minimum((after - by * before) ** 2 * weight / np.maximum(by, 1) ** 2, ceiling) + price[piece]
-    better = (np.bincount(piece, other, count) < total)[piece]
+    noise = np.square(np.maximum(factor, 1))
+    other = np.square(after - factor.take(piece) * before)
+    other *= weight
+    other /= noise.take(piece)
+    np.minimum(other, ceiling, out=other)
+    other += price.take(piece)
+    better = (np.bincount(piece, other, count) < total).take(piece)
     cost[mine[better]] = other[better]
     return cost

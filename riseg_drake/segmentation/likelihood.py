@@ -137,18 +137,26 @@ def _misfit(
         sought.read_between(frame.unhidden_gray),
         compared.per_variance,
         keyframe.owner,
-        keyframe.count,
+        keyframe.witness_count,
         parameters.residual_max,
         parameters.correlated_gray / light**2,
     )
     z = sought.depth / np.float32(depth_factor)  # as it is measured
     noise = float(np.sqrt(2)) * compared.depth_noise
-    sigma = np.hypot(depth_sigma(z, noise), np.float32(compared.depth_error) * z)
-    geometric = np.minimum(((z_1 - z) / sigma) ** 2, np.float32(parameters.residual_max))
-    of_depth = np.float32(parameters.correlated_gray / parameters.correlated_depth)
-    both = photometric + np.where(z_1 > 0, 1 + of_depth * (geometric - 1), np.float32(1))
-    lost = np.isnan(both)
-    total = np.bincount(keyframe.owner, np.where(lost, EXPECTED, both), keyframe.count)
+    variance = np.square(depth_sigma(z, noise))
+    variance += np.square(np.float32(compared.depth_error) * z)
+    geometric = np.square(z_1 - z)
+    geometric /= variance
+    np.minimum(geometric, np.float32(parameters.residual_max), out=geometric)
+    # Against what is right: depth that is not there says neither.
+    geometric -= 1
+    geometric *= np.float32(parameters.correlated_gray / parameters.correlated_depth)
+    geometric *= z_1 > 0
+    both = photometric + geometric
+    both += 1
+    lost = np.flatnonzero(np.isnan(both))
+    both[lost] = EXPECTED
+    total = np.bincount(keyframe.owner, both, keyframe.count)
     witnesses = keyframe.witness_count
     misfit = np.divide(total, witnesses, out=np.full(keyframe.count, EXPECTED), where=witnesses > 0)
     return misfit, keyframe.share_of_witnesses(lost)
