@@ -186,15 +186,23 @@ def _colored_like_things(
     what is dark: colour tells which are the thing's. That around them, as light and shadow are not everywhere
     the same.
     """
-    own, coarse = color[vu].astype(np.float32), (vu[0] // _EVERY, vu[1] // _EVERY)
-    off, share = [], []
-    for which in (thing, table):
-        weight = which[_every(_EVERY)].astype(np.float32)
-        total = cv2.blur(color[_every(_EVERY)] * weight[..., None], _AROUND)
-        share.append(cv2.blur(weight, _AROUND)[coarse])
-        mean = total[coarse] / np.maximum(share[-1], 1e-6)[:, None]
-        off.append(((own - mean) ** 2).sum(-1))
-    return (share[0] > _FEW) & ((off[0] < _ALIKE * off[1]) | (share[1] < _FEW / 10))
+    few = np.ascontiguousarray(color[_every(_EVERY)])
+    parts = [which[_every(_EVERY)].astype(np.uint8) for which in (thing, table)]
+    shares = [cv2.boxFilter(part, cv2.CV_32F, _AROUND) for part in parts]
+    v, u = vu
+    coarse = v // _EVERY * few.shape[1] + u // _EVERY
+    alike = shares[0].ravel().take(coarse) > _FEW
+    # Most pixels without depth are far from all things: the others' colours are asked alone.
+    near = np.flatnonzero(alike)
+    own, coarse = color[v[near], u[near]].astype(np.float32), coarse[near]
+    off = []
+    for part, share in zip(parts, shares, strict=True):
+        total = cv2.boxFilter(cv2.copyTo(few, part), cv2.CV_32F, _AROUND).reshape(-1, 3)
+        mean = total.take(coarse, axis=0) / np.maximum(share.ravel().take(coarse), 1e-6)[:, None]
+        squared = np.square(own - mean)
+        off.append(squared[:, 0] + squared[:, 1] + squared[:, 2])
+    alike[near] = (off[0] < _ALIKE * off[1]) | (shares[1].ravel().take(coarse) < _FEW / 10)
+    return alike
 
 
 def _enclosed(holes: NDArray[np.bool_], around: NDArray[np.uint8]) -> NDArray[np.bool_]:

@@ -70,7 +70,7 @@ def flow_around(above_0: AboveTable, pair: FramePair, method: FlowMethod) -> NDA
     columns, shifted_columns = _seen_in_both(columns, du, width)
     if min(rows.stop - rows.start, columns.stop - columns.start) >= _LEAST:
         images = pair.reference.color[rows, columns], pair.current.color[shifted_rows, shifted_columns]
-        np.add(method(*images), np.array([du, dv], np.float32), out=flow[rows, columns])
+        flow[rows, columns] = cv2.add(method(*images), (du, dv, 0, 0))
     return flow
 
 
