@@ -13,10 +13,9 @@ _SMALL_ANGLE = 1e-4
 
 def skew(a: NDArray) -> NDArray:
     """The matrix [a] with [a] b = a x b, [..., 3, 3] from [..., 3]."""
-    zero = np.zeros(a.shape[:-1])
-    x, y, z = a[..., 0], a[..., 1], a[..., 2]
-    rows = [zero, -z, y, z, zero, -x, -y, x, zero]
-    return np.stack(rows, axis=-1).reshape(*a.shape[:-1], 3, 3)
+    out = np.zeros((*a.shape[:-1], 3, 3), a.dtype)
+    out[..., 2, 1], out[..., 0, 2], out[..., 1, 0] = a[..., 0], a[..., 1], a[..., 2]
+    return out - np.swapaxes(out, -1, -2)
 
 
 def inverse(X: NDArray) -> NDArray:
@@ -49,7 +48,7 @@ def exp_se3(V: NDArray) -> NDArray:
     identity = np.eye(3)
     X = np.zeros((*V.shape[:-1], 4, 4))
     X[..., :3, :3] = identity + a * W + b * WW
-    X[..., :3, 3] = np.einsum("...ij,...j->...i", identity + b * W + c * WW, v)
+    X[..., :3, 3] = ((identity + b * W + c * WW) @ v[..., None])[..., 0]
     X[..., 3, 3] = 1.0
     return X
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import Intrinsics, rays
 from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
-from riseg_drake.geometry.se3 import exp_se3, move_points, translation
+from riseg_drake.geometry.se3 import exp_se3, move_points
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.noise import MeasurementNoise, depth_sigma
 from riseg_drake.segmentation.surface import Sought, SurfacePixels, seek, surface_pixels
@@ -103,7 +103,7 @@ def align_motions(
     for g, motion in enumerate(motions):
         mine = np.flatnonzero(owner == g + 1)
         if len(mine) >= parameters.members_min:
-            motion, _ = image_1.align(edges.subset(mine), motion, parameters.rounds, parameters)
+            motion = image_1.align(edges.subset(mine), motion, parameters.rounds, parameters)
         p_C0Q = edges.p_C0Q[mine] if len(mine) else edges.p_C0Q
         if all(flow_difference(p_C0Q, motion, X, focal_length) > parameters.same_flow for X in aligned):
             aligned.append(motion)
@@ -142,6 +142,11 @@ def has_contrast(variance: NDArray[np.float32], noise: MeasurementNoise) -> NDAr
     return variance - np.float32(2 * noise.color**2) > least
 
 
+def _cross(a: NDArray, b: NDArray) -> NDArray:
+    """a x b for vectors in columns, [3, N]; numpy's own takes longer to begin than all of a body's pixels."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
 def rigid_fit(pair: FramePair, depth_noise: float) -> "RigidFit":
     """Of the frame of t of a pair; `depth_noise` is that of depth at 1 m, m."""
     current = pair.current
@@ -171,8 +176,8 @@ class RigidFit:
 
     def align(
         self, edges: EdgePixels, motion: NDArray, rounds: int, parameters: AlignmentParameters
-    ) -> tuple[NDArray[np.float64], float]:
-        """One motion [4, 4] fitted to its own pixels, and the mean cost of these then."""
+    ) -> NDArray[np.float64]:
+        """One motion [4, 4] fitted to its own pixels."""
         centre = move_points(motion, edges.p_C0Q.mean(0)[None])[0]
         precision = np.repeat([parameters.turn**-2.0, parameters.shift**-2.0], 3)
         V, X = np.zeros(6), motion
@@ -180,40 +185,39 @@ class RigidFit:
             normal, rhs = np.diag(precision), -precision * V
             for residual, J, count in self._linearised(edges, X, centre):
                 weight = 1 / (1 + residual**2 / parameters.outlier) / count
-                known = np.isfinite(weight) & np.isfinite(J).all(1)
-                J, weight, residual = J[known], weight[known], residual[known]
-                normal = normal + (J * weight[:, None]).T @ J
-                rhs = rhs - J.T @ (weight * residual)
+                # What is not known tells nothing.
+                known = np.isfinite(residual + J.sum(0))
+                if not known.all():
+                    J, weight, residual = J[:, known], weight[known], residual[known]
+                weighted = J * weight
+                normal += weighted @ J.T
+                rhs -= weighted @ residual
             step = np.linalg.solve(normal, rhs)
             V = V + step
-            X = translation(centre) @ exp_se3(step) @ translation(-centre) @ X
-        return X, float(self.cost(edges, X).mean())
+            turned = exp_se3(step)
+            turned[:3, 3] += centre - turned[:3, :3] @ centre
+            X = turned @ X
+        return X
 
     def _linearised(
         self, edges: EdgePixels, X: NDArray, centre: NDArray
     ) -> list[tuple[NDArray, NDArray, NDArray | np.float32]]:
-        """Residuals of gray value and depth [N], their derivatives by a twist about the centre [N, 6], and
+        """Residuals of gray value and depth [N], their derivatives by a twist about the centre [6, N], and
         how many pixels of each say the same."""
         gray, depth, sigma, sought = self._residuals(edges, X)
-        p = move_points(X, edges.p_C0Q)
-        q = move_points(self.X_C1C0, p)
-        g_u, g_v = (
-            0.5
-            * (
-                sought.shifted(du, dv).read_between(self.gray)
-                - sought.shifted(-du, -dv).read_between(self.gray)
-            )
-            / np.sqrt(edges.variance)
-            for du, dv in ((1, 0), (0, 1))
-        )
-        along = np.stack([g_u * self.intrinsics.fx, g_v * self.intrinsics.fy], axis=1) / q[:, 2:]
-        R_C1C0 = self.X_C1C0[:3, :3]
-        d_gray = np.column_stack([along, -(along * q[:, :2]).sum(1) / q[:, 2]]) @ R_C1C0
-        d_depth = -R_C1C0[2] / sigma[:, None]
-        return [
-            (residual, np.column_stack([np.cross(p - centre, d_p), d_p]), count)
-            for residual, d_p, count in ((gray, d_gray, np.float32(1)), (depth, d_depth, edges.alike))
-        ]
+        p = X[:3, :3] @ edges.p_C0Q.T + X[:3, 3:]
+        q = self.X_C1C0[:3, :3] @ p + self.X_C1C0[:3, 3:]
+        R_C1C0, arm = self.X_C1C0[:3, :3], p - centre[:, None]
+        d_q = np.empty_like(q)
+        d_q[:2] = sought.slope(self.gray) / np.sqrt(edges.variance)
+        d_q[:2] *= np.array([[self.intrinsics.fx], [self.intrinsics.fy]]) / q[2]
+        d_q[2] = -(d_q[0] * q[0] + d_q[1] * q[1]) / q[2]
+        d_gray = R_C1C0.T @ d_q
+        of_gray = np.concatenate([_cross(arm, d_gray), d_gray])
+        # Depth's derivative has one direction for all.
+        of_depth = np.concatenate([_cross(arm, R_C1C0[2][:, None]), np.broadcast_to(R_C1C0[2][:, None], p.shape)])
+        of_depth /= -sigma
+        return [(gray, of_gray, np.float32(1)), (depth, of_depth, edges.alike)]
 
     def _residuals(self, edges: EdgePixels, motion: NDArray) -> tuple[NDArray, NDArray, NDArray, Sought]:
         """Normalised residuals of gray value and depth [N], the latter's sigma (m), and where all that is."""

@@ -75,7 +75,7 @@ def _followed(
         if len(own) >= _EDGES_MIN:
             mine = edges.subset(own[:: -(-len(own) // _EDGES)])
             start = min((motion, *proposed), key=lambda X: float(fit.cost(mine, X).mean()))
-            motion = fit.align(mine, start, parameters.rounds, parameters)[0]
+            motion = fit.align(mine, start, parameters.rounds, parameters)
         followed.append(motion)
     return followed
 

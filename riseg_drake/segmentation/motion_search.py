@@ -275,7 +275,7 @@ class _Search:
         if len(edges) < _EDGES_MIN:
             return None
         alignment = self._parameters.alignment
-        return self._fit.align(self._keyframe.edges.subset(edges), motion, alignment.rounds, alignment)[0]
+        return self._fit.align(self._keyframe.edges.subset(edges), motion, alignment.rounds, alignment)
 
     def _gain(self, own: Costs) -> float:
         """Nats by which a motion explains a part better, or superpixels wherever they are."""

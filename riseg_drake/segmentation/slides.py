@@ -11,6 +11,9 @@ from riseg_drake.geometry.se3 import skew
 from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.likelihood import EXPECTED
 
+_AT_ONCE = 256
+"""Motions, about, that are tried at once."""
+
 
 class SlideCosts:
     """A keyframe and a frame, prepared for many motions, given in the keyframe's camera K."""
@@ -27,20 +30,37 @@ class SlideCosts:
 
     def of(self, p_KQ: NDArray, v: NDArray, u: NDArray, motions_K: NDArray) -> NDArray:
         """Mean squared residuals [G] under motions [G, 4, 4] of points [S, 3], m, at pixels v, u [S]."""
-        frame, most = self._compared.frame, self._residual_max
+        gray_0, variance = self._gray_0[v, u], self._variance[v, u]
+        return np.concatenate([self._costs(p_KQ, gray_0, variance, some) for some in _some_at_once(motions_K)])
+
+    def _costs(self, p_KQ: NDArray, gray_0: NDArray, variance: NDArray, motions_K: NDArray) -> NDArray:
+        """The same of points with gray values and variances [S]."""
+        frame, most = self._compared.frame, np.float32(self._residual_max)
         u_1, v_1, z = self._places(p_KQ, motions_K)
-        found = cv2.remap(self._gray_1, u_1, v_1, cv2.INTER_LINEAR, borderValue=0)
+        cost = cv2.remap(self._gray_1, u_1, v_1, cv2.INTER_LINEAR, borderValue=0)
+        cost -= gray_0
+        cost *= cost
+        cost /= variance
+        np.minimum(cost, most, out=cost)
         z_1 = cv2.remap(frame.unhidden_depth, u_1, v_1, cv2.INTER_NEAREST, borderValue=0)
-        cost = np.minimum((found - self._gray_0[v, u]) ** 2 / self._variance[v, u], most)
-        sigma = np.float32(2 * np.sqrt(2) * self._compared.depth_noise) * z**2
-        cost += np.where(z_1 > 0, np.minimum(((z_1 - z) / sigma) ** 2, most), EXPECTED / 2)
+        missing = z_1 == 0
+        z_1 -= z
+        z *= z
+        z *= np.float32(2 * np.sqrt(2) * self._compared.depth_noise)  # the standard deviation
+        z_1 /= z
+        z_1 *= z_1
+        np.minimum(z_1, most, out=z_1)
+        np.copyto(z_1, np.float32(EXPECTED / 2), where=missing)
+        cost += z_1
         return cost.mean(1)
 
     def taken(self, p_KQ: NDArray, motions_K: NDArray) -> NDArray:
         """Squared residuals [G] for free points [S, 3], m, that motions [G, 4, 4] take where it is not free."""
-        u, v, _ = self._places(p_KQ, motions_K)
-        taken = cv2.remap(self._standing, u, v, cv2.INTER_LINEAR, borderValue=0)
-        return self._residual_max * taken.mean(1)
+        means = []
+        for some in _some_at_once(motions_K):
+            u, v, _ = self._places(p_KQ, some)
+            means.append(cv2.remap(self._standing, u, v, cv2.INTER_LINEAR, borderValue=0).mean(1))
+        return self._residual_max * np.concatenate(means)
 
     def _places(self, p_KQ: NDArray, motions_K: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Where motions [G, 4, 4] take points [S, 3] in the frame: u, v, pixels, and depth, m, [G, S]."""
@@ -48,9 +68,15 @@ class SlideCosts:
         K = np.array([[k.fx, 0, k.cx], [0, k.fy, k.cy], [0, 0, 1]])
         P = (K @ (self._compared.X_C1K @ motions_K)[:, :3]).astype(np.float32)
         homogeneous = np.column_stack([p_KQ, np.ones(len(p_KQ))]).astype(np.float32)
-        zu, zv, z = np.moveaxis((P.reshape(-1, 4) @ homogeneous.T).reshape(len(P), 3, -1), 1, 0)
-        u, v = zu / z, zv / z
+        u, v, z = np.swapaxes(P, 0, 1) @ homogeneous.T
+        u /= z
+        v /= z
         return u, v, z
+
+
+def _some_at_once(motions_K: NDArray) -> list[NDArray]:
+    """Motions [G, 4, 4] in parts, few enough for all that is made of them to stay in the processor's cache."""
+    return np.array_split(motions_K, max(1, len(motions_K) // _AT_ONCE))
 
 
 def slides(normal: NDArray, centre: NDArray, amounts: NDArray) -> NDArray[np.float64]:

@@ -52,9 +52,13 @@ class Sought:
     depth: NDArray[np.float32]
     """[N], m; not positive for points that are not ahead of C1."""
 
-    def shifted(self, du: float, dv: float) -> "Sought":
-        """The places beside these, by some pixels."""
-        return Sought(self.u + np.float32(du), self.v + np.float32(dv), self.depth)
+    def slope(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
+        """By how much an image of C1 rises there along u and along v [2, N], a pixel; NaN where it cannot be
+        read one pixel to both sides."""
+        u = np.concatenate([self.u + 1, self.u, self.u - 1, self.u])
+        v = np.concatenate([self.v, self.v + 1, self.v, self.v - 1])
+        values = _between(image, u, v).reshape(2, 2, -1)[..., : len(self.depth)]
+        return np.float32(0.5) * (values[0] - values[1])
 
     def inside(self, shape: tuple[int, int]) -> NDArray[np.bool_]:
         """Which of them [N] an image of some rows and columns shows."""
@@ -63,17 +67,21 @@ class Sought:
 
     def read(self, image: NDArray, outside: float = 0) -> NDArray:
         """The values [N] of the nearest pixels of an image of C1; `outside` beyond its edges."""
-        return self._read(image, cv2.INTER_NEAREST, outside)
+        values = cv2.remap(
+            image, self.u, self.v, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=outside
+        )
+        return values.ravel()[: len(self.depth)]
 
     def read_between(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
         """The values [N] of an image of C1, interpolated; NaN beyond its edges and beside any NaN."""
-        return self._read(image, cv2.INTER_LINEAR, float("nan"))
+        return _between(image, self.u, self.v).ravel()[: len(self.depth)]
 
-    def _read(self, image: NDArray, interpolation: int, outside: float) -> NDArray:
-        values = cv2.remap(
-            image, self.u, self.v, interpolation, borderMode=cv2.BORDER_CONSTANT, borderValue=outside
-        )
-        return values.ravel()[: len(self.depth)]
+
+def _between(
+    image: NDArray[np.float32], u: NDArray[np.float32], v: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """The values [R, 256] of an image between its pixels; NaN beyond its edges."""
+    return cv2.remap(image, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=float("nan"))
 
 
 def surface_pixels(
