@@ -59,6 +59,13 @@ class Frame(Immutable):
         return np.where(self.robot, np.float32(np.nan), self.gray)
 
     @cached_property
+    def gradient_squared(self) -> NDArray[np.float32]:
+        """Of the gray values [H, W], squared gray levels a squared pixel."""
+        return cv2.Sobel(self.gray, cv2.CV_32F, 1, 0, scale=0.125) ** 2 + (
+            cv2.Sobel(self.gray, cv2.CV_32F, 0, 1, scale=0.125) ** 2
+        )
+
+    @cached_property
     def unhidden_depth(self) -> NDArray[np.float32]:
         """Depth [H, W], m, with 0 (invalid) where the robot is in the way."""
         return np.where(self.robot, np.float32(0), self.depth)

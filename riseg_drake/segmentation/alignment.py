@@ -214,9 +214,8 @@ class RigidFit:
         d_q[2] = -(d_q[0] * q[0] + d_q[1] * q[1]) / q[2]
         d_gray = R_C1C0.T @ d_q
         of_gray = np.concatenate([_cross(arm, d_gray), d_gray])
-        # Depth's derivative has one direction for all.
-        of_depth = np.concatenate([_cross(arm, R_C1C0[2][:, None]), np.broadcast_to(R_C1C0[2][:, None], p.shape)])
-        of_depth /= -sigma
+        ahead = np.broadcast_to(R_C1C0[2][:, None], p.shape)
+        of_depth = np.concatenate([_cross(arm, ahead), ahead]) / -sigma
         return [(gray, of_gray, np.float32(1)), (depth, of_depth, edges.alike)]
 
     def _residuals(self, edges: EdgePixels, motion: NDArray) -> tuple[NDArray, NDArray, NDArray, Sought]:

@@ -84,9 +84,9 @@ def zero_motion_evidence(
     """
     # Every other row and column will do for a mean over a window.
     half = (slice(None, None, 2), slice(None, None, 2))
-    I_0, I_1 = pair.reference.gray[region], pair.current.unhidden_gray
-    per_variance = 1 / gray_variance(I_0, noise)[half]
-    I_0, uv = I_0[half], pixel_grid(*pair.current.intrinsics.shape)[region][half]
+    I_0, I_1 = pair.reference.gray[region][half], pair.current.unhidden_gray
+    per_variance = 1 / gray_variance(pair.reference.gradient_squared[region][half], noise)
+    uv = pixel_grid(*pair.current.intrinsics.shape)[region][half]
     E_t, O_t = expected_flow[region][half], optical_flow[region][half]
     costs = []
     for flow in (E_t, O_t):

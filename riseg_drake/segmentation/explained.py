@@ -39,7 +39,8 @@ def explained_share(
     asked[::_STEP, ::_STEP] = above_0.mask[::_STEP, ::_STEP]
     pixels = surface_pixels(asked, pair.reference.depth, pair.reference.intrinsics)
     v, u = pixels.pixel
-    gray, variance = pair.reference.gray[v, u], gray_variance(pair.reference.gray, noise)[v, u]
+    gray = pair.reference.gray[v, u]
+    variance = gray_variance(pair.reference.gradient_squared[v, u], noise)
 
     def agrees(motion: NDArray) -> NDArray[np.float32]:
         """1 where the images agree, 0 where not, NaN where they cannot be compared."""

@@ -92,6 +92,11 @@ class Keyframe(Immutable):
         """Of each superpixel's witnesses the share [N] that is among some of them, by their numbers."""
         return np.bincount(self.owner.take(which), minlength=self.count) / np.maximum(self.witness_count, 1)
 
+    @cached_property
+    def covered(self) -> NDArray[np.bool_]:
+        """[H, W], what stands there, and four pixels around it."""
+        return cv2.dilate(self.above.mask.view(np.uint8), np.ones((9, 9), np.uint8)).view(bool)
+
     @property
     def pixels_per_metre(self) -> float:
         """How large things appear, about, pixels a metre."""
@@ -122,7 +127,7 @@ def make_keyframe(
     cut = with_occlusions(cut, cv2.medianBlur(height, 5), parameters.behind)
     owner = np.full(above.mask.shape, -1, np.intp)
     owner[region] = cut.label
-    variance = gray_variance(frame.gray, noise)
+    variance = gray_variance(frame.gradient_squared, noise)
     measured = cv2.morphologyEx((frame.depth > 0).view(np.uint8), cv2.MORPH_CLOSE, _PINHOLE)
     core = cv2.erode(measured * (owner >= 0).view(np.uint8), _RIM, borderValue=0) > 0
     core[::2, ::2] = core[1::2, 1::2] = False
@@ -139,7 +144,7 @@ def make_keyframe(
         owner=owner[v, u],
         gray=frame.gray[v, u],
         variance=variance[v, u],
-        gradient_squared=(variance[v, u] - np.float32(2 * noise.color**2)) / np.float32(noise.registration**2),
+        gradient_squared=frame.gradient_squared[v, u],
         edges=edge_pixels(frame, owner, has_contrast(variance, noise), variance, parameters.edge_pixels),
     )
 

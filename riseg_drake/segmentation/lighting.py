@@ -46,7 +46,8 @@ def gray_costs(
     mine = np.flatnonzero((total > 0.5 * pixels).take(piece) & ~unknown)
     if not len(mine):
         return cost
-    piece, before, after, weight = (x.take(mine) for x in (piece, before, after, per_variance))
+    piece, weight = piece.take(mine), per_variance.take(mine)
+    before, after = before.take(mine), after.take(mine)
     # The likeliest factor, by least squares.
     weighted = weight * before
     products = np.bincount(piece, weighted * after, count) + certainty

@@ -31,13 +31,12 @@ def depth_sigma(depth: NDArray, noise_at_1m: float) -> NDArray:
     return noise_at_1m * depth**2
 
 
-def gray_variance(gray: NDArray[np.float32], noise: MeasurementNoise) -> NDArray[np.float32]:
-    """Variance [H, W] of the difference between a gray value and where it should reappear.
+def gray_variance(gradient_squared: NDArray[np.float32], noise: MeasurementNoise) -> NDArray[np.float32]:
+    """Variance [...] of the difference between a gray value and where it should reappear.
 
-    Sensor noise of both images, and what a small error of position makes of the gradient.
+    Sensor noise of both images, and what a small error of position makes of the gradient, of which the square
+    [...] is given, see `Frame.gradient_squared`.
     """
-    gradient_squared = cv2.Sobel(gray, cv2.CV_32F, 1, 0, scale=0.125) ** 2
-    gradient_squared += cv2.Sobel(gray, cv2.CV_32F, 0, 1, scale=0.125) ** 2
     return np.float32(2 * noise.color**2) + np.float32(noise.registration**2) * gradient_squared
 
 

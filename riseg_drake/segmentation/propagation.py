@@ -12,10 +12,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import Intrinsics, bounding_region, project, rays
+from riseg_drake.geometry.camera import Intrinsics, bounding_region, project
 from riseg_drake.geometry.nearest import nearest_places
 from riseg_drake.geometry.rgbd import Frame, FramePair
-from riseg_drake.geometry.se3 import inverse, move_points
+from riseg_drake.geometry.se3 import inverse
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.surface import SurfacePixels, seek, surface_pixels
 

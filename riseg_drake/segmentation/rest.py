@@ -31,10 +31,12 @@ def is_still(
     span = camera_span(before, frame)
     if span > parameters.camera_span:
         return False
-    looked_at = above.mask & ~frame.robot & ~before.robot
-    if not looked_at.any():
+    looked_at = np.flatnonzero(above.mask & ~frame.robot & ~before.robot)
+    if not len(looked_at):
         return True
+    gray_0, gray_1, gradient_squared = (
+        image.ravel().take(looked_at) for image in (before.gray, frame.gray, before.gradient_squared)
+    )
     # What the camera's own last creeping does to the image is no motion of things.
-    variance = gray_variance(before.gray, replace(noise, registration=noise.registration + span))
-    squared = (frame.gray - before.gray)[looked_at] ** 2
-    return bool(np.mean(squared > parameters.sigmas**2 * variance[looked_at]) < parameters.share)
+    variance = gray_variance(gradient_squared, replace(noise, registration=noise.registration + span))
+    return bool(np.mean((gray_1 - gray_0) ** 2 > parameters.sigmas**2 * variance) < parameters.share)

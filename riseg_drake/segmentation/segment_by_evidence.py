@@ -8,7 +8,6 @@ second frame becomes the keyframe.
 
 from dataclasses import dataclass, field, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -292,14 +291,14 @@ def _leaves_keyframe(
     this frame: a camera that is too near to measure most of it will be back."""
     every = (slice(2, None, 6), slice(2, None, 6))
     standing_there = above.mask[every] & (frame.depth[every] > 0)
-    in_keyframe = belief.keyframe.frame.depth[every][belief.keyframe.above.mask[every]]
+    keyframe = belief.keyframe
+    in_keyframe = keyframe.frame.depth[every][keyframe.above.mask[every]]
     if (frame.depth[every][standing_there] ** 2).sum() <= _AS_MUCH * (in_keyframe**2).sum():
         return False
     p_C1Q = (rays(frame.intrinsics)[every] * frame.depth[every][..., None])[standing_there].astype(float)
-    p_KQ = move_points(inverse(belief.keyframe.frame.X_WC) @ frame.X_WC, p_C1Q)
-    known = cv2.dilate(belief.keyframe.above.mask.view(np.uint8), np.ones((9, 9), np.uint8))
+    p_KQ = move_points(inverse(keyframe.frame.X_WC) @ frame.X_WC, p_C1Q)
     covered = np.zeros(len(p_KQ), bool)
     for X in bodies.motions_K:
         (v, u), inside = (a.T for a in pixels_of(move_points(inverse(X), p_KQ), frame.intrinsics))
-        covered[inside] |= known[v[inside], u[inside]] > 0
+        covered[inside] |= keyframe.covered[v[inside], u[inside]]
     return bool(np.mean(~covered) > parameters.uncovered)

@@ -66,9 +66,10 @@ class SlideCosts:
         """Where motions [G, 4, 4] take points [S, 3] in the frame: u, v, pixels, and depth, m, [G, S]."""
         k = self._compared.frame.intrinsics
         K = np.array([[k.fx, 0, k.cx], [0, k.fy, k.cy], [0, 0, 1]])
-        P = (K @ (self._compared.X_C1K @ motions_K)[:, :3]).astype(np.float32)
+        # One product for all motions: beside each other they are the columns of one matrix.
+        P = (K @ self._compared.X_C1K[:3]) @ motions_K.swapaxes(0, 1).reshape(4, -1)
         homogeneous = np.column_stack([p_KQ, np.ones(len(p_KQ))]).astype(np.float32)
-        u, v, z = np.swapaxes(P, 0, 1) @ homogeneous.T
+        u, v, z = P.reshape(3, -1, 4).astype(np.float32) @ homogeneous.T
         u /= z
         v /= z
         return u, v, z

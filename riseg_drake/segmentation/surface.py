@@ -77,9 +77,7 @@ class Sought:
         return _between(image, self.u, self.v).ravel()[: len(self.depth)]
 
 
-def _between(
-    image: NDArray[np.float32], u: NDArray[np.float32], v: NDArray[np.float32]
-) -> NDArray[np.float32]:
+def _between(image: NDArray[np.float32], u: NDArray[np.float32], v: NDArray[np.float32]) -> NDArray[np.float32]:
     """The values [R, 256] of an image between its pixels; NaN beyond its edges."""
     return cv2.remap(image, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=float("nan"))
 

@@ -46,7 +46,13 @@ def test_the_factor_is_the_likeliest_one() -> None:
     after[0] = np.float32(90)
     one = np.arange(len(PIECE))
     cost = gray_costs(
-        np.full(len(PIECE), 100, np.float32), after, np.ones(len(PIECE), np.float32), one, np.bincount(one), 1e4, 1e4
+        np.full(len(PIECE), 100, np.float32),
+        after,
+        np.ones(len(PIECE), np.float32),
+        one,
+        np.bincount(one),
+        1e4,
+        1e4,
     )
     assert cost[0] == pytest.approx((90 - 95) ** 2 + 1e4 * 0.05**2)
     np.testing.assert_array_equal(cost[1:], 0)
