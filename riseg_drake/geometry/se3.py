@@ -48,7 +48,7 @@ def exp_se3(V: NDArray) -> NDArray:
     identity = np.eye(3)
     X = np.zeros((*V.shape[:-1], 4, 4))
     X[..., :3, :3] = identity + a * W + b * WW
-    X[..., :3, 3] = ((identity + b * W + c * WW) @ v[..., None])[..., 0]
+    X[..., :3, 3] = np.einsum("...ij,...j->...i", identity + b * W + c * WW, v)
     X[..., 3, 3] = 1.0
     return X
 

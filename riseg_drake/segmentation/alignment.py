@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import Intrinsics, rays
 from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
-from riseg_drake.geometry.se3 import exp_se3, move_points
+from riseg_drake.geometry.se3 import exp_se3, move_points, translation
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.noise import MeasurementNoise, depth_sigma
 from riseg_drake.segmentation.surface import Sought, SurfacePixels, seek, surface_pixels
@@ -142,9 +142,17 @@ def has_contrast(variance: NDArray[np.float32], noise: MeasurementNoise) -> NDAr
     return variance - np.float32(2 * noise.color**2) > least
 
 
-def _cross(a: NDArray, b: NDArray) -> NDArray:
-    """a x b for vectors in columns, [3, N]; numpy's own takes longer to begin than all of a body's pixels."""
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+def _by_twist(arm: NDArray, d_p: NDArray) -> NDArray:
+    """Derivatives [N, 6] by a twist, of what changes by d_p [N, 3] with a point that lies at `arm` [N, 3].
+
+    [arm x d_p, d_p]; numpy's own product takes longer to begin than all of a body's pixels.
+    """
+    x, y, z = arm.T
+    a, b, c = d_p.T
+    out = np.empty((len(arm), 6))
+    out[:, 0], out[:, 1], out[:, 2] = y * c - z * b, z * a - x * c, x * b - y * a
+    out[:, 3:] = d_p
+    return out
 
 
 def rigid_fit(pair: FramePair, depth_noise: float) -> "RigidFit":
@@ -186,37 +194,33 @@ class RigidFit:
             for residual, J, count in self._linearised(edges, X, centre):
                 weight = 1 / (1 + residual**2 / parameters.outlier) / count
                 # What is not known tells nothing.
-                known = np.isfinite(residual + J.sum(0))
+                known = np.isfinite(residual + J.sum(1))
                 if not known.all():
-                    J, weight, residual = J[:, known], weight[known], residual[known]
-                weighted = J * weight
-                normal += weighted @ J.T
-                rhs -= weighted @ residual
+                    J, weight, residual = J[known], weight[known], residual[known]
+                normal += (J * weight[:, None]).T @ J
+                rhs -= J.T @ (weight * residual)
             step = np.linalg.solve(normal, rhs)
             V = V + step
-            turned = exp_se3(step)
-            turned[:3, 3] += centre - turned[:3, :3] @ centre
-            X = turned @ X
+            X = translation(centre) @ exp_se3(step) @ translation(-centre) @ X
         return X
 
     def _linearised(
         self, edges: EdgePixels, X: NDArray, centre: NDArray
     ) -> list[tuple[NDArray, NDArray, NDArray | np.float32]]:
-        """Residuals of gray value and depth [N], their derivatives by a twist about the centre [6, N], and
+        """Residuals of gray value and depth [N], their derivatives by a twist about the centre [N, 6], and
         how many pixels of each say the same."""
         gray, depth, sigma, sought = self._residuals(edges, X)
-        p = X[:3, :3] @ edges.p_C0Q.T + X[:3, 3:]
-        q = self.X_C1C0[:3, :3] @ p + self.X_C1C0[:3, 3:]
-        R_C1C0, arm = self.X_C1C0[:3, :3], p - centre[:, None]
-        d_q = np.empty_like(q)
-        d_q[:2] = sought.slope(self.gray) / np.sqrt(edges.variance)
-        d_q[:2] *= np.array([[self.intrinsics.fx], [self.intrinsics.fy]]) / q[2]
-        d_q[2] = -(d_q[0] * q[0] + d_q[1] * q[1]) / q[2]
-        d_gray = R_C1C0.T @ d_q
-        of_gray = np.concatenate([_cross(arm, d_gray), d_gray])
-        ahead = np.broadcast_to(R_C1C0[2][:, None], p.shape)
-        of_depth = np.concatenate([_cross(arm, ahead), ahead]) / -sigma
-        return [(gray, of_gray, np.float32(1)), (depth, of_depth, edges.alike)]
+        p = move_points(X, edges.p_C0Q)
+        q = move_points(self.X_C1C0, p)
+        g_u, g_v = sought.slope(self.gray) / np.sqrt(edges.variance)
+        along = np.stack([g_u * self.intrinsics.fx, g_v * self.intrinsics.fy], axis=1) / q[:, 2:]
+        R_C1C0 = self.X_C1C0[:3, :3]
+        d_gray = np.column_stack([along, -(along * q[:, :2]).sum(1) / q[:, 2]]) @ R_C1C0
+        d_depth = -R_C1C0[2] / sigma[:, None]
+        return [
+            (residual, _by_twist(p - centre, d_p), count)
+            for residual, d_p, count in ((gray, d_gray, np.float32(1)), (depth, d_depth, edges.alike))
+        ]
 
     def _residuals(self, edges: EdgePixels, motion: NDArray) -> tuple[NDArray, NDArray, NDArray, Sought]:
         """Normalised residuals of gray value and depth [N], the latter's sigma (m), and where all that is."""
