@@ -105,25 +105,25 @@ def motion_between(
     """
     return {
         name: ObjectMotion(
-            moved_m=float(np.linalg.norm(X_WB[:3, 3] - before[name][:3, 3])),
-            tilted_deg=tilt(before[name], X_WB, axes.get(name, NO_AXES)),
-            tilted_in_all_deg=tilt(start[name], X_WB, axes.get(name, NO_AXES)),
-            left_table=bool(X_WB[2, 3] < 0.0),
-            came_down_m=float(start[name][2, 3] - X_WB[2, 3]),
+            moved_m=float(np.linalg.norm(X_WBcm[:3, 3] - before[name][:3, 3])),
+            tilted_deg=tilt(before[name], X_WBcm, axes.get(name, NO_AXES)),
+            tilted_in_all_deg=tilt(start[name], X_WBcm, axes.get(name, NO_AXES)),
+            left_table=bool(X_WBcm[2, 3] < 0.0),
+            came_down_m=float(start[name][2, 3] - X_WBcm[2, 3]),
         )
-        for name, X_WB in after.items()
+        for name, X_WBcm in after.items()
     }
 
 
-def tilt(X_WB0: NDArray, X_WB1: NDArray, axes: NDArray = NO_AXES) -> float:
+def tilt(X_WBcm0: NDArray, X_WBcm1: NDArray, axes: NDArray = NO_AXES) -> float:
     """By how much an object leans more than it did, degrees; neither turning on the table nor rolling counts.
 
     Args:
-        X_WB0: [4, 4], before.
-        X_WB1: [4, 4], after.
+        X_WBcm0: [4, 4], before.
+        X_WBcm1: [4, 4], after.
         axes: unit vectors in B [k, 3] about which it is a body of revolution; none, one, or a ball's three.
     """
-    R_WB0, R_WB1 = X_WB0[:3, :3], X_WB1[:3, :3]
+    R_WB0, R_WB1 = X_WBcm0[:3, :3], X_WBcm1[:3, :3]
     if len(axes) == 0:
         return _from_vertical(R_WB1 @ R_WB0.T[:, 2])
     if len(axes) == 1:

@@ -136,10 +136,9 @@ def edge_pixels(
     return EdgePixels(surface, p_C0Q, piece[v, u], frame.gray[v, u], variance[v, u], alike)
 
 
-def has_contrast(variance: NDArray[np.float32], noise: MeasurementNoise) -> NDArray[np.bool_]:
-    """Which pixels, by their `gray_variance` [N], have more gradient than noise, and so tell where they are."""
-    least = noise.registration**2 * _GRADIENT_MIN * noise.color**2
-    return variance - np.float32(2 * noise.color**2) > least
+def has_contrast(gradient_squared: NDArray[np.float32], noise: MeasurementNoise) -> NDArray[np.bool_]:
+    """Which pixels [...] tell where they are: by `Frame.gradient_squared` more changes than noise does."""
+    return gradient_squared > _GRADIENT_MIN * noise.color**2
 
 
 def _by_twist(arm: NDArray, d_p: NDArray) -> NDArray:

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.camera import Intrinsics
 
 _ROWS = 64
+"""Rows of an image that are worked on at once: what is made of them stays in the processor's cache."""
 
 
 def pixel_projection(X_C1C0: NDArray[np.float64], intrinsics: Intrinsics) -> NDArray[np.float32]:
@@ -49,7 +50,6 @@ def expected_flow(
     u = np.arange(intrinsics.width, dtype=np.float32)[None, :]
     v = np.arange(intrinsics.height, dtype=np.float32)[:, None]
     flow = np.empty((*depth_0.shape, 2), np.float32)
-    # Some rows at once: what is made of them stays in the processor's cache.
     for start in range(0, intrinsics.height, _ROWS):
         rows = slice(start, start + _ROWS)
         with np.errstate(divide="ignore", invalid="ignore"):

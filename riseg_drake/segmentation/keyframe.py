@@ -145,7 +145,9 @@ def make_keyframe(
         gray=frame.gray[v, u],
         variance=variance[v, u],
         gradient_squared=frame.gradient_squared[v, u],
-        edges=edge_pixels(frame, owner, has_contrast(variance, noise), variance, parameters.edge_pixels),
+        edges=edge_pixels(
+            frame, owner, has_contrast(frame.gradient_squared, noise), variance, parameters.edge_pixels
+        ),
     )
 
 
