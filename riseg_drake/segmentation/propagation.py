@@ -98,7 +98,7 @@ def draw_labels(
     for a in np.flatnonzero(np.bincount(owner)):
         own = surface.subset(np.flatnonzero(owner == a))
         sought = seek(own, X_C1C0 @ motion_of.get(int(a), np.eye(4)))
-        inside = np.flatnonzero(sought.inside(label_0.shape))
+        inside = np.flatnonzero(sought.inside(current.intrinsics.shape))
         if not len(inside):
             continue
         row, column = (np.rint(x.ravel()[inside]).astype(np.intp) for x in (sought.v, sought.u))
