@@ -5,27 +5,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import (
-    ClippingRange,
-    ColorRenderCamera,
-    DepthRange,
-    DepthRenderCamera,
-    MakeRenderEngineVtk,
-    RenderCameraCore,
-)
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.sensors import CameraInfo
 
-from riseg_drake.geometry.rgbd import sanitize_depth
 from riseg_drake.geometry.se3 import exp_se3
 from riseg_drake.recording.layout import RecordedFrame
+from riseg_drake.stations.filmed_world import FilmedWorld
+from riseg_drake.stations.scene import SceneConfig
 from riseg_drake.stations.sensor_noise import every_depth_error
-from riseg_drake.stations.simulated import CLIPPING, RENDERER, SimulatedStationConfig, add_world
-from riseg_drake.stations.wrist_camera import CameraConfig, measured_images
-
-ARM_ASIDE = [2.8, -1.2, 0.0, -2.4, 0.0, 1.6, 0.8]
-"""Joint angles, rad, with which the arm is behind its own base."""
+from riseg_drake.stations.wrist_camera import CameraConfig
 
 
 @dataclass
@@ -54,38 +41,21 @@ class StillFilmParameters:
 def still_film(parameters: StillFilmParameters, seed: int) -> Iterator[RecordedFrame]:
     """The frames of one film: a scene drawn from the seed, at rest, with true labels and poses that err.
 
-    The arm is put aside. Raises SceneError where no scene can be drawn.
+    Raises SceneError where no scene can be drawn.
     """
     camera = parameters.camera
-    config = SimulatedStationConfig(camera=camera, start_position=ARM_ASIDE)
-    builder = DiagramBuilder()
-    world = add_world(builder, config, seed, config.time_step)
-    world.scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(config.renderer))
-    diagram = builder.Build()
-    context = diagram.CreateDefaultContext()
-    query = world.scene_graph.get_query_output_port().Eval(world.scene_graph.GetMyContextFromRoot(context))
-    info = CameraInfo(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
-    core = RenderCameraCore(RENDERER, info, ClippingRange(*CLIPPING), RigidTransform())
-    color_camera, depth_camera = ColorRenderCamera(core), DepthRenderCamera(core, DepthRange(*CLIPPING))
-    table = np.zeros(2**15, np.uint16)
-    for object_id, body in world.object_bodies.items():
-        table[int(body)] = object_id
+    world = FilmedWorld(camera, seed)
     rng = np.random.default_rng([seed, parameters.frames])
-    origin = world.scene_graph.world_frame_id()
-    middle = np.array([*config.scene.centre_W, 0.02])
+    middle = np.array([*SceneConfig().centre_W, 0.02])
+    sigma = np.repeat([parameters.pose_turn_std, parameters.pose_shift_std], 3)
     for number, X_WC in enumerate(hand_path(parameters, middle, rng)):
-        color = query.RenderColorImage(color_camera, origin, X_WC).data[..., :3]
-        depth = sanitize_depth(query.RenderDepthImage(depth_camera, origin, X_WC).data[..., 0])
-        label = table[query.RenderLabelImage(color_camera, origin, X_WC).data[..., 0]]
-        true = X_WC.GetAsMatrix4()
         noise = np.random.default_rng([seed, number])
-        seen, measured = measured_images(color, depth, camera, noise, true, seed)
-        sigma = np.repeat([parameters.pose_turn_std, parameters.pose_shift_std], 3)
+        color, depth, label = world.look(X_WC, noise)
         yield RecordedFrame(
             time=number / camera.rate,
-            color=seen,
-            depth=measured,
-            X_WC=true @ exp_se3(sigma * noise.normal(size=6)),
+            color=color,
+            depth=depth,
+            X_WC=X_WC.GetAsMatrix4() @ exp_se3(sigma * noise.normal(size=6)),
             labels=label,
         )
 
