@@ -32,7 +32,9 @@ PLACES = [MIDDLE + np.array([x, y]) for x in (-0.09, 0.09) for y in (-0.11, 0.11
 """m, on the table, so far apart that nothing meets."""
 DISTANCE = 0.55
 """m from the camera, which looks straight down, to the table."""
-FRAMES, REST = 6, 4
+PUSHING = np.array([0.03, 0.02, -0.12])
+"""m by which a camera on the arm is elsewhere amid a push."""
+FRAMES, REST = 8, 4
 """Frames that a motion takes, and that follow it at rest."""
 FAR, TURN = (0.01, 0.03), 0.35
 """m that a thing goes, and rad that it turns at most."""
@@ -55,10 +57,11 @@ class Table:
         self._label = np.zeros(self._camera.intrinsics.shape, np.uint16)
         self._frames = 0
 
-    def watch(self, X_WBs: Sequence[RigidTransform], frames: int = 1) -> None:
-        """Let Alg. 2 see the things so, for some frames."""
+    def watch(self, X_WBs: Sequence[RigidTransform], frames: int = 1, share: float = 0.0) -> None:
+        """Let Alg. 2 see the things so, for some frames, from a `share` of the way to where pushes are made."""
         self._world.put(X_WBs)
-        X_WC = RigidTransform(RotationMatrix(np.diag([1.0, -1.0, -1.0])), [*MIDDLE, DISTANCE])
+        p_WC = np.array([*MIDDLE, DISTANCE]) + share * PUSHING
+        X_WC = RigidTransform(RotationMatrix(np.diag([1.0, -1.0, -1.0])), p_WC)
         sigma = np.repeat([POSE_TURN, POSE_SHIFT], 3)
         for _ in range(frames):
             color, depth, self._label = self._world.look(X_WC, self._rng)
@@ -118,8 +121,8 @@ def moved(X_WB: RigidTransform, turn: float, way: NDArray, about: NDArray | None
 
 def go(table: Table, start: Sequence[RigidTransform], end: Sequence[RigidTransform]) -> None:
     """From one rest to the next."""
-    for X_WBs in on_the_way(start, end, FRAMES):
-        table.watch(X_WBs)
+    for k, X_WBs in enumerate(on_the_way(start, end, FRAMES), 1):
+        table.watch(X_WBs, share=np.sin(np.pi * k / FRAMES))
     table.watch(end, REST)
 
 
