@@ -106,18 +106,18 @@ def bodies_of(
     before: Bodies | None,
     parameters: BeliefParameters,
     *,
-    at_rest: bool,
+    decides: bool,
 ) -> tuple[Observation, Bodies]:
     """The bodies, with what one frame says, and that with what the bodies' motions add to its evidence.
 
-    Ids are those of the belief, and for what it did not know those of the frame before. Only `at_rest` motions
-    are known so well that a body which none of them explains falls apart for it.
+    Ids are those of the belief, and for what it did not know those of the frame before. Only in a frame that
+    `decides` all motions were searched for, so that a body which none of them explains falls apart for it.
     """
     keyframe = belief.keyframe
     part = partition(
-        keyframe, belief.bond + seen.evidence, parameters.partition, seen.nats if at_rest else None
+        keyframe, belief.bond + seen.evidence, parameters.partition, seen.nats if decides else None
     )
-    if at_rest:
+    if decides:
         seen = replace(seen, evidence=seen.evidence + apart(keyframe, part, seen.nats, parameters.partition))
     motion = motions_of_parts(part, seen.nats, parameters.partition)
     found_before = np.bincount(part, keyframe.area * (belief.body > 0), len(motion))

@@ -137,8 +137,7 @@ def segment_by_evidence(
     if deciding:
         candidates_K = search_motions(_problem(belief, compared, above_1, parameters), candidates_K)
         if len(candidates_K):
-            at_rest = now.still_since is not None
-            seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters, at_rest=at_rest)
+            seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters, decides=True)
         else:
             bodies = standing(belief)
     return _carried(now, pair, above_1, seen, bodies, deciding, parameters, bfif)
@@ -185,11 +184,11 @@ def _explained(
     before: Bodies,
     parameters: EvidenceParameters,
     *,
-    at_rest: bool = False,
+    decides: bool = False,
 ) -> tuple[Observation, Bodies]:
     """What a frame says, given some motions [C, 4, 4], and the bodies by it."""
     seen = observe(compared, belief.bond, belief.part, candidates_K, parameters.observation)
-    return bodies_of(belief, seen, before, parameters.belief, at_rest=at_rest)
+    return bodies_of(belief, seen, before, parameters.belief, decides=decides)
 
 
 def _problem(

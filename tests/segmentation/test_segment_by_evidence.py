@@ -5,7 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.segmentation.drawn_scene import DrawnScene, intersection_over_union, looking_down, planar
+from tests.segmentation.drawn_scene import (
+    Blank,
+    DrawnScene,
+    Texture,
+    intersection_over_union,
+    looking_down,
+    planar,
+)
 from tests.segmentation.watched import Watcher
 
 
@@ -87,3 +94,22 @@ def test_what_was_decided_in_motion_is_looked_at_once_more_at_its_rest() -> None
     assert in_motion
     assert not any(a.decided for a in in_motion)
     assert answers[-1].decided
+
+
+def test_two_that_hands_moved_as_one_and_then_apart_are_two_whole_things_without_any_rest() -> None:
+    scene = DrawnScene([(0.07, 0.06, 0.03), (0.09, 0.11, 0.03)], textures=[Texture(0), Blank(150.0)])
+    watcher, rng = Watcher(), np.random.default_rng(0)
+    together, apart = [0.0, 0.0, *0.003 * np.arange(1, 10)], 0.003 * np.arange(1, 10)
+    way = [(0.0, y) for y in together] + [(x, together[-1]) for x in apart]
+    ids = []
+    for sequence, (x, y) in enumerate(way):
+        places = [planar(-0.036 - x, y - 0.03), planar(0.046 + x, y - 0.03)]
+        frame, label = scene.frame(sequence, looking_down(), places, rng)
+        segmentation = watcher.take(frame).segmentation
+        assert segmentation.still_since is None or sequence < 2
+        ids.append({int(a) for a in np.unique(segmentation.mask) if a})
+    assert len(ids[len(together) - 1]) == 1
+    one, other = (np.bincount(segmentation.mask[label == i]).argmax() for i in (1, 2))
+    assert one != other
+    assert intersection_over_union(segmentation.mask == one, label == 1) > 0.9
+    assert intersection_over_union(segmentation.mask == other, label == 2) > 0.9
