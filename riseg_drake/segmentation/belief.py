@@ -110,15 +110,13 @@ def bodies_of(
 ) -> tuple[Observation, Bodies]:
     """The bodies, with what one frame says, and that with what the bodies' motions add to its evidence.
 
-    Ids are those of the belief, and for what it did not know those of the frame before. Only in a frame that
-    `decides` all motions were searched for, so that a body which none of them explains falls apart for it.
+    Ids are those of the belief, and for what it did not know those of the frame before. A body that no one
+    motion explains falls apart for it. A frame that `decides` has its outlines redrawn: that takes as long as
+    all else.
     """
     keyframe = belief.keyframe
-    part = partition(
-        keyframe, belief.bond + seen.evidence, parameters.partition, seen.nats if decides else None
-    )
-    if decides:
-        seen = replace(seen, evidence=seen.evidence + apart(keyframe, part, seen.nats, parameters.partition))
+    part = partition(keyframe, belief.bond + seen.evidence, parameters.partition, seen.nats, redraws=decides)
+    seen = replace(seen, evidence=seen.evidence + apart(keyframe, part, seen.nats, parameters.partition))
     motion = motions_of_parts(part, seen.nats, parameters.partition)
     found_before = np.bincount(part, keyframe.area * (belief.body > 0), len(motion))
     moved = (motion > 0) | (2 * found_before > np.bincount(part, keyframe.area, len(motion)))

@@ -77,9 +77,14 @@ class Comparison(Immutable):
         return self.pair.X_C1C0
 
     @cached_property
+    def another_view(self) -> float:
+        """How far this is another view: 0 where the camera has not moved, 1 where errors are wholly others."""
+        return min(camera_span(self.keyframe.frame, self.frame) / _ANOTHER_VIEW, 1.0)
+
+    @cached_property
     def shift(self) -> float:
         """Pixels by which what stands still seems to have moved."""
-        return self.view_error * min(camera_span(self.keyframe.frame, self.frame), _ANOTHER_VIEW)
+        return self.view_error * self.another_view * _ANOTHER_VIEW
 
     @cached_property
     def per_variance(self) -> NDArray:
@@ -97,4 +102,4 @@ class Comparison(Immutable):
     @property
     def depth_error(self) -> float:
         """Share of depth by which it errs otherwise than in the keyframe."""
-        return self.shift / _ANOTHER_VIEW
+        return self.view_error * self.another_view

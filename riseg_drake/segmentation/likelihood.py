@@ -32,6 +32,8 @@ class LikelihoodParameters:
     turn."""
     light_still: float = 0.02
     """The same where nothing moves: shading stays what it was."""
+    light_view: float = 0.2
+    """So much more of it from another view, where gloss shows other lights."""
     correlated_gray: float = 3.0
     """Errors of gray are alike in about so many witnesses, or six pixels (pose, interpolation); they count as
     one."""
@@ -106,12 +108,13 @@ def motion_costs(
     errs = parameters.view_errors * compared.view_error
     seen = parameters.view_errors * compared.shift > _SEEN
     depth_factors = 1 + errs * np.array([0.0, -1.0, -0.5, 0.5, 1.0]) if seen else np.ones(1)
+    seen_otherwise = parameters.light_view * compared.another_view
     misfit, hidden = np.empty((2, len(motions_K), keyframe.count))
     for k, motion in enumerate(motions_K):
         still = np.array_equal(motion, np.eye(4))
-        light = parameters.light_still if still else parameters.light
+        light = np.hypot(parameters.light_still if still else parameters.light, seen_otherwise)
         factors = depth_factors if still else np.ones(1)
-        tries = [_misfit(compared, motion, factor, light, parameters) for factor in factors]
+        tries = [_misfit(compared, motion, factor, float(light), parameters) for factor in factors]
         misfit[k] = np.min([each for each, _ in tries], axis=0)
         hidden[k] = np.maximum(tries[0][1] - compared.leaves, 0)
     return Costs(misfit, keyframe.witness_count.astype(float), hidden)

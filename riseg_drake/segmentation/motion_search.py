@@ -145,7 +145,7 @@ def missing_motion(problem: SearchProblem, known_K: NDArray[np.float64]) -> NDAr
     # More than a motion's price, for its size: not a sliver, and not a heap of which one thing moves.
     worst = int(((missed - gain_min) / (bodies @ keyframe.area)).argmax())
     body = bodies[worst]
-    motion = search.best_motion(body, np.where(body, 0.0, np.inf)) if missed[worst] >= gain_min else None
+    motion = search.best_motion(body, np.where(body, 0.0, np.inf)) if 2 * missed[worst] >= gain_min else None
     if motion is not None:
         left = _missed(body[None], search.costs.with_motion(motion[2]), likelihood)
         if 2 * left[0] < missed[worst]:

@@ -36,15 +36,17 @@ def partition(
     bond: NDArray[np.float64],
     parameters: PartitionParameters,
     nats: NDArray[np.float64] | None = None,
+    *,
+    redraws: bool = False,
 ) -> NDArray[np.intp]:
     """The part 0.. of each superpixel [N] for the log-odds of each border [M]; no part is too small.
 
     With `nats` [G, N], how badly each motion explains each superpixel: a body is rigid, and what saw it move
-    may be far from the border that is in question.
+    may be far from the border that is in question. Then outlines may be `redrawn`, too.
     """
     weight = bond * keyframe.length
     part = multicut(keyframe.count, keyframe.borders, weight, nats, parameters.rigid_min)
-    if nats is not None and len(nats) > 1:
+    if redraws and nats is not None and len(nats) > 1:
         part = redrawn(part, keyframe.borders, weight, nats, parameters)
     return _without_small(
         part, keyframe.borders, weight, keyframe.area, parameters.area_min * keyframe.pixels_per_metre**2

@@ -122,10 +122,7 @@ def segment_by_evidence(
         now.still_since is not None
         and not now.decided
         and (frame.time - now.still_since >= parameters.rest.time)
-        and (
-            _share_in_view(belief, bodies, frame) > parameters.in_view
-            or _leaves_keyframe(belief, bodies, frame, above_1, parameters)
-        )
+        and _share_in_view(belief, bodies, frame) > parameters.in_view
     )
     if not deciding and now.still_since is None and frame.time - now.searched >= parameters.search_every:
         now = replace(now, searched=frame.time)
@@ -134,13 +131,16 @@ def segment_by_evidence(
     if len(candidates_K) and not deciding:
         seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters)
         deciding = _has_gone_far(now, frame, seen, bodies, parameters)
+    # What the next keyframe cannot be compared with any more is looked for now.
+    leaves = bool(above_1.mask.any()) and _leaves_keyframe(belief, bodies, frame, above_1, parameters)
+    deciding |= leaves
     if deciding:
         candidates_K = search_motions(_problem(belief, compared, above_1, parameters), candidates_K)
         if len(candidates_K):
             seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters, decides=True)
         else:
             bodies = standing(belief)
-    return _carried(now, pair, above_1, seen, bodies, deciding, parameters, bfif)
+    return _carried(now, pair, above_1, seen, bodies, deciding, leaves, parameters, bfif)
 
 
 def _begin(
@@ -212,6 +212,7 @@ def _carried(
     seen: Observation | None,
     bodies: Bodies,
     deciding: bool,
+    leaves: bool,
     parameters: EvidenceParameters,
     bfif: BFIFParameters,
 ) -> Segmentation:
@@ -235,7 +236,7 @@ def _carried(
     # What was decided in motion is looked at once more when it rests.
     decided = now.decided or (deciding and now.still_since is not None)
     moved = deciding and len(bodies.motions_K) > 1
-    if not above.mask.any() or not (moved or _leaves_keyframe(belief, bodies, frame, above, parameters)):
+    if not above.mask.any() or not (moved or leaves):
         return replace(now, margin=margin, decided=decided)
     memory: Memory = {}
     if parameters.memory:

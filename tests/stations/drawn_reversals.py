@@ -34,7 +34,7 @@ DISTANCE = 0.55
 """m from the camera, which looks straight down, to the table."""
 PUSHING = np.array([0.03, 0.02, -0.12])
 """m by which a camera on the arm is elsewhere amid a push."""
-FRAMES, REST = 8, 4
+FRAMES, REST = 8, 10
 """Frames that a motion takes, and that follow it at rest."""
 FAR, TURN = (0.01, 0.03), 0.35
 """m that a thing goes, and rad that it turns at most."""
