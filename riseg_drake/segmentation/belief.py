@@ -105,17 +105,14 @@ def bodies_of(
     seen: Observation,
     before: Bodies | None,
     parameters: BeliefParameters,
-    *,
-    decides: bool,
 ) -> tuple[Observation, Bodies]:
     """The bodies, with what one frame says, and that with what the bodies' motions add to its evidence.
 
     Ids are those of the belief, and for what it did not know those of the frame before. A body that no one
-    motion explains falls apart for it. A frame that `decides` has its outlines redrawn: that takes as long as
-    all else.
+    motion explains falls apart for it.
     """
     keyframe = belief.keyframe
-    part = partition(keyframe, belief.bond + seen.evidence, parameters.partition, seen.nats, redraws=decides)
+    part = partition(keyframe, belief.bond + seen.evidence, parameters.partition, seen.nats)
     seen = replace(seen, evidence=seen.evidence + apart(keyframe, part, seen.nats, parameters.partition))
     motion = motions_of_parts(part, seen.nats, parameters.partition)
     found_before = np.bincount(part, keyframe.area * (belief.body > 0), len(motion))

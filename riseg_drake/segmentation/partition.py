@@ -36,17 +36,15 @@ def partition(
     bond: NDArray[np.float64],
     parameters: PartitionParameters,
     nats: NDArray[np.float64] | None = None,
-    *,
-    redraws: bool = False,
 ) -> NDArray[np.intp]:
     """The part 0.. of each superpixel [N] for the log-odds of each border [M]; no part is too small.
 
     With `nats` [G, N], how badly each motion explains each superpixel: a body is rigid, and what saw it move
-    may be far from the border that is in question. Then outlines may be `redrawn`, too.
+    may be far from the border that is in question.
     """
     weight = bond * keyframe.length
     part = multicut(keyframe.count, keyframe.borders, weight, nats, parameters.rigid_min)
-    if redraws and nats is not None and len(nats) > 1:
+    if nats is not None and len(nats) > 1:
         part = redrawn(part, keyframe.borders, weight, nats, parameters)
     return _without_small(
         part, keyframe.borders, weight, keyframe.area, parameters.area_min * keyframe.pixels_per_metre**2
@@ -73,21 +71,33 @@ def redrawn(
         parameters: see there.
     """
     motion = motions_of_parts(part, nats, parameters)
-    own = np.eye(len(motion), dtype=bool)
-    beside = np.zeros_like(own)
+    beside = np.zeros((len(motion), len(motion)), bool)
     beside[part[borders[:, 0]], part[borders[:, 1]]] = True
-    may_be = own | ((beside | beside.T) & (motion[:, None] != motion))
-    unary = np.where(may_be[:, part], nats[motion], _NEVER)
-    graph = PottsGraph(len(part), borders, np.maximum(weight, 0.0))
-    label, _ = potts_labels(unary.astype(np.float32), graph)
+    beside = (beside | beside.T) & (motion[:, None] != motion)
+    # Parts all of whose neighbours move as they do stay as they are, and so do their borders.
+    asked = np.flatnonzero(beside.any(1))
+    if not len(asked):
+        return part
+    mine = np.flatnonzero(np.isin(part, asked))
+    place = np.full(len(part), -1)
+    place[mine] = np.arange(len(mine))
+    inner = (place[borders] >= 0).all(1)
+    edges, coupling = place[borders[inner]], weight[inner]
+    before = np.searchsorted(asked, part[mine])
+    may_be = (np.eye(len(motion), dtype=bool) | beside)[np.ix_(asked, part[mine])]
+    own = nats[:, mine]
+    unary = np.where(may_be, own[motion[asked]], _NEVER)
+    label, _ = potts_labels(unary.astype(np.float32), PottsGraph(len(mine), edges, np.maximum(coupling, 0.0)))
 
     def energy(label: NDArray[np.intp]) -> float:
-        cut = label[borders[:, 0]] != label[borders[:, 1]]
-        return float(weight[cut].sum() + nats[motion[label], np.arange(len(label))].sum())
+        cut = label[edges[:, 0]] != label[edges[:, 1]]
+        return float(coupling[cut].sum() + own[motion[asked[label]], np.arange(len(label))].sum())
 
-    if energy(label) >= energy(part):
+    if energy(label) >= energy(before):
         return part
-    return np.unique(label, return_inverse=True)[1]
+    redrawn_part = part.copy()
+    redrawn_part[mine] = asked[label]
+    return np.unique(redrawn_part, return_inverse=True)[1]
 
 
 def apart(

@@ -137,7 +137,7 @@ def segment_by_evidence(
     if deciding:
         candidates_K = search_motions(_problem(belief, compared, above_1, parameters), candidates_K)
         if len(candidates_K):
-            seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters, decides=True)
+            seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters)
         else:
             bodies = standing(belief)
     return _carried(now, pair, above_1, seen, bodies, deciding, leaves, parameters, bfif)
@@ -183,12 +183,10 @@ def _explained(
     candidates_K: NDArray[np.float64],
     before: Bodies,
     parameters: EvidenceParameters,
-    *,
-    decides: bool = False,
 ) -> tuple[Observation, Bodies]:
     """What a frame says, given some motions [C, 4, 4], and the bodies by it."""
     seen = observe(compared, belief.bond, belief.part, candidates_K, parameters.observation)
-    return bodies_of(belief, seen, before, parameters.belief, decides=decides)
+    return bodies_of(belief, seen, before, parameters.belief)
 
 
 def _problem(

@@ -31,6 +31,7 @@ def keyframe() -> Keyframe:
 def test_what_stands_seems_to_move_by_a_share_of_the_cameras_motion(keyframe: Keyframe, aside: float) -> None:
     compared = Comparison(keyframe, over(aside), depth_noise=0.0023, view_error=0.02)
     assert compared.shift == pytest.approx(0.02 * CAMERA.fx * aside / DEPTH, rel=1e-3, abs=1e-9)
+    assert compared.another_view == pytest.approx(CAMERA.fx * aside / DEPTH / 100, rel=1e-3, abs=1e-9)
     # And depth by as large a share, times how far it is another view, which it is from 100 pixels on.
     assert compared.depth_error == pytest.approx(compared.shift / 100)
 
@@ -39,6 +40,7 @@ def test_from_100_pixels_on_it_is_another_view_and_no_more_than_that(keyframe: K
     # 20 cm are 147 pixels.
     compared = Comparison(keyframe, over(0.2), depth_noise=0.0023, view_error=0.02)
     assert (compared.shift, compared.depth_error) == pytest.approx((2.0, 0.02))
+    assert compared.another_view == 1.0
 
 
 def test_without_pairs_it_is_what_is_assumed() -> None:

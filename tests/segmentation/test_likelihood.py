@@ -131,3 +131,21 @@ def test_what_leaves_the_image_by_the_cameras_own_motion_is_not_hidden(plate: tu
     compared = Comparison(keyframe, away[0], DEPTH_NOISE, view_error=0.01)
     hidden = motion_costs(compared, np.array([np.eye(4), back]), LikelihoodParameters()).hidden
     np.testing.assert_array_equal(hidden, 0)
+
+
+@pytest.mark.parametrize("another", [0.0, 0.3, 1.0])
+def test_light_is_freer_the_farther_the_view_is_another_one(
+    plate: tuple[Keyframe, Frame], another: float
+) -> None:
+    keyframe, frame = plate
+    # A blank plate, brighter and otherwise the same: only how far it is said to be another view differs.
+    brighter = replace(frame, color=np.full_like(frame.color, 132))
+    compared = Comparison(keyframe, brighter, DEPTH_NOISE, view_error=0.0)
+    vars(compared)["another_view"] = another
+    misfit = motion_costs(compared, STILL, LikelihoodParameters()).misfit[0]
+    witnesses = np.bincount(keyframe.owner, minlength=keyframe.count)
+    c = 3 / (0.02**2 + (0.2 * another) ** 2)
+    w = witnesses[witnesses > 0]
+    f = (w * 120 * 132 / 8 + c) / (w * 120**2 / 8 + c)
+    expected = (132 - 120 * f) ** 2 / 8 / f**2 + c * (f - 1) ** 2 / w + 1 - 3 / 14
+    np.testing.assert_allclose(misfit[witnesses > 0], np.minimum(expected, 9 + 1 - 3 / 14), rtol=0.02)

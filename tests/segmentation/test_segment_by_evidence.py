@@ -113,3 +113,16 @@ def test_two_that_hands_moved_as_one_and_then_apart_are_two_whole_things_without
     assert one != other
     assert intersection_over_union(segmentation.mask == one, label == 1) > 0.9
     assert intersection_over_union(segmentation.mask == other, label == 2) > 0.9
+
+
+def test_of_boxes_that_stand_flush_the_one_that_is_pushed_has_an_id_before_any_rest() -> None:
+    scene = DrawnScene([(0.07, 0.06, 0.03)] * 3)
+    watcher, rng = Watcher(), np.random.default_rng(0)
+    for sequence, y in enumerate([0.0, 0.0, *0.002 * np.arange(1, 9)]):
+        places = [planar(-0.0705, 0.0), planar(0.0, y), planar(0.0705, 0.0)]
+        # The camera moves, as on an arm: nothing is decided while it does.
+        frame, label = scene.frame(sequence, looking_down(0.5 * y), places, rng)
+        segmentation = watcher.take(frame).segmentation
+        assert segmentation.belief.keyframe.frame.sequence == 0
+        if sequence >= 2:  # from 1.5 pixels on
+            assert intersection_over_union(segmentation.mask > 0, label == 2) > 0.93
