@@ -90,8 +90,8 @@ def test_an_outline_goes_where_the_motions_part_and_not_where_the_picture_does(m
 
 
 def test_parts_beside_none_of_another_motion_stay_and_the_others_are_redrawn_as_if_alone():
-    # The row of before, 3 to 7 now, behind three parts that stand still as its first one does: none of them borders
-    # on what moves.
+    # The row of before, 3 to 7 now, behind three parts that stand still as its first one does: none of them is
+    # beside what moves.
     nats = np.array([[0.0, 0, 0, 0, 0, 3.0, 20.0, 20.0], [20.0, 20, 20, 20, 20, 0, 0, 0]])
     borders = np.array([[k, k + 1] for k in range(7)])
     weight = np.array([-1.0, -1.0, -1.0, 5.0, 0.5, -0.5, 5.0])
