@@ -78,7 +78,7 @@ class Comparison(Immutable):
 
     @cached_property
     def another_view(self) -> float:
-        """How far this is another view, a share: 0 where the camera has not moved, 1 where errors are others."""
+        """How far this is another view, a share: 0 where the camera has not moved, 1 where errors are new."""
         return min(camera_span(self.keyframe.frame, self.frame) / _ANOTHER_VIEW, 1.0)
 
     @cached_property
