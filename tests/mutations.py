@@ -17,7 +17,7 @@ import sys
 import tempfile
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,8 +31,8 @@ ROOMS = ("geometry", "segmentation", "pushing", "robot", "stations", "systems", 
 LONGEST = 600
 """s that a room's tests may take; a mutant that hangs is killed."""
 
-Edit = tuple[ast.AST, Callable[[str], str], str]
-"""What is replaced, by which text for its own, and what is wrong then."""
+Edit = tuple[ast.AST, str, str]
+"""What is replaced, by which text, and what is wrong then."""
 
 
 @dataclass(frozen=True)
@@ -67,34 +67,29 @@ def edits(tree: ast.AST, source: str) -> Iterator[Edit]:
     def text(node: ast.AST) -> str:
         return ast.get_source_segment(source, node) or ""
 
-    def put(new: str) -> Callable[[str], str]:
-        return lambda _: new
-
     for node in _code(tree):
         match node:
             case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in _COMPARISONS:
                 turned = f"(({text(left)}) {_COMPARISONS[type(op)]} ({text(right)}))"
-                yield node, put(turned), "comparison flipped"
+                yield node, turned, "comparison flipped"
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS and not _of_text(node):
-                yield node, put(f"(({text(left)}) {_OPERATORS[type(op)]} ({text(right)}))"), "operator flipped"
+                yield node, f"(({text(left)}) {_OPERATORS[type(op)]} ({text(right)}))", "operator flipped"
                 if isinstance(op, ast.Add | ast.Sub):
-                    yield node, put(f"({text(left)})"), "term dropped"
+                    yield node, f"({text(left)})", "term dropped"
             case ast.UnaryOp(op=ast.USub() | ast.Invert() | ast.Not(), operand=operand):
-                yield node, put(f"({text(operand)})"), "sign dropped"
+                yield node, f"({text(operand)})", "sign dropped"
             case ast.BoolOp(values=[first, *_, last]):
-                yield node, put(f"({text(first)})"), "condition dropped"
-                yield node, put(f"({text(last)})"), "condition dropped"
+                yield node, f"({text(first)})", "condition dropped"
+                yield node, f"({text(last)})", "condition dropped"
             case ast.If(test=test) | ast.IfExp(test=test):
-                yield test, lambda old: f"(not ({old}))", "condition turned"
+                yield test, f"(not ({text(test)}))", "condition turned"
             case ast.Call(args=[first, second, *_]) if not {type(first), type(second)} & {ast.Starred}:
                 if text(first) != text(second):
-                    yield first, put(text(second)), "arguments swapped"
-            case ast.Constant(value=bool()) | ast.Constant(value=str()) | ast.Constant(value=None):
-                pass
+                    yield first, text(second), "arguments swapped"
             case ast.Constant(value=float(value)) if value != 0:
-                yield node, put(repr(2 * value)), "constant doubled"
-            case ast.Constant(value=int(value)):
-                yield node, put(repr(value + 1)), "off by one"
+                yield node, repr(2 * value), "constant doubled"
+            case ast.Constant(value=int(value)) if not isinstance(value, bool):
+                yield node, repr(value + 1), "off by one"
 
 
 def _code(tree: ast.AST) -> Iterator[ast.AST]:
@@ -139,10 +134,10 @@ def mutations_of(file: Path) -> list[Mutation]:
         # Columns are bytes.
         line = lines[row].encode()
         a, b = node.col_offset, node.end_col_offset  # type: ignore[attr-defined]
-        before = line[a:b].decode()
-        after = _swapped(line, node, new(before), source, kind)
-        if after is None:
-            after = (line[:a] + new(before).encode() + line[b:]).decode()
+        if kind == "arguments swapped":
+            after = _swapped(line, a, b, new)
+        else:
+            after = (line[:a] + new.encode() + line[b:]).decode()
         if after == lines[row]:
             continue
         mutated = "".join([*lines[:row], after, *lines[row + 1 :]])
@@ -157,16 +152,12 @@ def mutations_of(file: Path) -> list[Mutation]:
     return found
 
 
-def _swapped(line: bytes, first: ast.AST, second: str, source: str, kind: str) -> str | None:
-    """The line with a call's first argument and the `second`, which follows it, in each other's place."""
-    if kind != "arguments swapped":
-        return None
-    a, b = first.col_offset, first.end_col_offset  # type: ignore[attr-defined]
-    own = line[a:b]
+def _swapped(line: bytes, a: int, b: int, second: str) -> str:
+    """The line with what stands from column a to b, and the `second` that follows it, in each other's place."""
     at = line.find(second.encode(), b)
     if at < 0:
         return line.decode()
-    return (line[:a] + second.encode() + line[b:at] + own + line[at + len(second.encode()) :]).decode()
+    return (line[:a] + second.encode() + line[b:at] + line[a:b] + line[at + len(second.encode()) :]).decode()
 
 
 def drawn(rooms: Sequence[str], count: int, seed: int) -> list[Mutation]:

@@ -10,10 +10,11 @@ from pydrake.geometry import (
     RenderCameraCore,
     RenderEngineVtkParams,
 )
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 from pydrake.systems.sensors import CameraInfo
 
+from riseg_drake.stations.filmed_world import looking_at
 from riseg_drake.stations.simulated import CLIPPING, SimulatedStation
 
 RENDERER = "onlooker"
@@ -47,14 +48,6 @@ class Onlooker:
         query = self._scene_graph.get_query_output_port().Eval(here)
         world = self._scene_graph.world_frame_id()
         return query.RenderColorImage(self._camera, world, self._X_WC).data[..., :3].copy()
-
-
-def looking_at(eye_W: NDArray, target_W: NDArray) -> RigidTransform:
-    """X_WC of a camera at `eye_W` [3] that looks at `target_W` [3], the world's z up in its image."""
-    ahead = (target_W - eye_W) / np.linalg.norm(target_W - eye_W)
-    right = np.cross(ahead, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    return RigidTransform(RotationMatrix(np.column_stack([right, np.cross(ahead, right), ahead])), eye_W)
 
 
 def _light() -> RenderEngineVtkParams:

@@ -12,7 +12,7 @@ from pydrake.geometry import (
     MakeRenderEngineVtk,
     RenderCameraCore,
 )
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import CameraInfo
 
@@ -60,3 +60,11 @@ class FilmedWorld:
         label = self._id_of[query.RenderLabelImage(self._color, W, X_WC).data[..., 0]].astype(np.uint16)
         seen, measured = measured_images(color, depth, self._camera, rng, X_WC.GetAsMatrix4(), self._seed)
         return seen, measured, label
+
+
+def looking_at(eye_W: NDArray, target_W: NDArray) -> RigidTransform:
+    """X_WC of a camera at `eye_W` [3] that looks at `target_W` [3], the world's z up in its image."""
+    ahead = (target_W - eye_W) / np.linalg.norm(target_W - eye_W)
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    return RigidTransform(RotationMatrix(np.column_stack([right, np.cross(ahead, right), ahead])), eye_W)

@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 
 from riseg_drake.geometry.se3 import exp_se3
 from riseg_drake.recording.layout import RecordedFrame
-from riseg_drake.stations.filmed_world import FilmedWorld
+from riseg_drake.stations.filmed_world import FilmedWorld, looking_at
 from riseg_drake.stations.scene import SceneConfig
 from riseg_drake.stations.sensor_noise import every_depth_error
 from riseg_drake.stations.wrist_camera import CameraConfig
@@ -73,10 +73,5 @@ def hand_path(
     for number in range(parameters.frames):
         wave = np.sin(2 * np.pi * number / parameters.camera.rate / period + phase).mean(1)
         eye = rest + parameters.sway * wave[:3]
-        z = middle - eye
-        z /= np.linalg.norm(z)
-        x = np.cross(z, [0, 0, 1.0])
-        x /= np.linalg.norm(x)
-        X_WC = RigidTransform(RotationMatrix(np.column_stack([x, np.cross(z, x), z])), eye)
         aim = exp_se3(np.concatenate([parameters.turn * wave[3:], np.zeros(3)]))
-        yield X_WC @ RigidTransform(aim)
+        yield looking_at(eye, middle) @ RigidTransform(aim)

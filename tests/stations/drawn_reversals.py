@@ -162,9 +162,7 @@ def merged(seed: int, models: Sequence[ObjectModel]) -> list[tuple[str, bool]]:
     middle = MIDDLE
     turns, heading = rng.uniform(-np.pi, np.pi, 2), rng.uniform(-np.pi, np.pi)
     u = np.array([np.cos(heading), np.sin(heading)])
-    away = travel(
-        other.footprint.moved(turns[1], middle + u), one.footprint.moved(turns[0], middle), -u
-    )  # fmt: skip
+    away = travel(other.footprint.moved(turns[1], middle + u), one.footprint.moved(turns[0], middle), -u)
     if not np.isfinite(away):
         return []
     start = [standing(one, middle, turns[0]), standing(other, middle + (1 - away + 3e-4) * u, turns[1])]
