@@ -80,6 +80,7 @@ class WiredDiagram:
         self._object_bodies = station.object_bodies if simulated else {}
         self._centres = {i: RigidTransform(placed.model.centre) for i, placed in enumerate(objects, start=1)}
         self._ports: dict[str, OutputPort] = {}
+        self._sleep = station.sleep if isinstance(station, SimulatedStation) else None
 
     def read(self, port: str, context: Context) -> Any:
         """The present value of an exported output; Drake may write the next one into the same place."""
@@ -135,6 +136,11 @@ class WiredDiagram:
     def position(self, context: Context) -> NDArray[np.float64]:
         """Joint angles theta_t [7], rad."""
         return self.read("panda.position_measured", context)
+
+    def let_sleep(self, context: Context) -> None:
+        """To be called once a picture: a simulation leaves alone what lies still and out of the robot's reach."""
+        if self._sleep is not None:
+            self._sleep.look(context)
 
     def true_labels(self, context: Context) -> NDArray[np.uint16]:
         """The true visible object ids [H, W] of this moment; drawn when asked for."""

@@ -118,6 +118,7 @@ def interactions(
             book.count(news.frame, is_at_rest=news.phase is ArmPhase.OBSERVE)
             for listener in listeners:
                 listener(news.frame, context)
+            wired.let_sleep(context)
         decided = progress.phase is ArmPhase.OBSERVE and news.phase is not ArmPhase.OBSERVE
         progress.time, progress.phase = context.get_time() - start, news.phase
         if decided:

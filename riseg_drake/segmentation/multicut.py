@@ -6,6 +6,7 @@ for joining. Nobody says how many parts there are.
 """
 
 import heapq
+from operator import add
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,9 @@ def multicut(
     bonds: list[dict[int, float]] = [{} for _ in range(nodes)]
     for a, b, w in zip(edges[:, 0].tolist(), edges[:, 1].tolist(), weight.tolist(), strict=True):
         bonds[a][b] = bonds[b][a] = bonds[a].get(b, 0.0) + w
-    cost = None if nats is None or len(nats) < 2 else nats.T.copy()
+    # Lists, not arrays: there are few motions, and a thousand pairs are asked one by one.
+    cost = None if nats is None or len(nats) < 2 else nats.T.tolist()
+    lowest = None if cost is None else [min(each) for each in cost]
     size = [1] * nodes  # in nodes; a part whose size is the same is the same part
     # What a pair of parts gains: at first its bond, and what remains of it once its motions were looked at.
     queue = [(-w, a, b, 0, 0) for a in range(nodes) for b, w in bonds[a].items() if a < b and w > 0]
@@ -41,7 +44,9 @@ def multicut(
         if (size_a, size_b) != (size[a], size[b]):
             if size_a == 0 and w != -negative:
                 continue  # their bond has changed
-            lost = 0.0 if cost is None else float(loss(cost[a], cost[b])) - free
+            lost = -1.0
+            if cost is not None and lowest is not None:
+                lost = min(map(add, cost[a], cost[b])) - lowest[a] - lowest[b] - free
             if lost > 0:
                 if w > lost:
                     heapq.heappush(queue, (lost - w, a, b, size[a], size[b]))
@@ -53,8 +58,9 @@ def multicut(
             a, b = b, a
         parent[b] = a
         size[a] += size[b]
-        if cost is not None:
-            cost[a] += cost[b]
+        if cost is not None and lowest is not None:
+            cost[a] = list(map(add, cost[a], cost[b]))
+            lowest[a] = min(cost[a])
         del bonds[a][b]
         for c, w in bonds[b].items():
             if c == a:

@@ -43,6 +43,7 @@ from riseg_drake.stations.contact import let_touch, set_contact_model
 from riseg_drake.stations.object_models import resolve
 from riseg_drake.stations.placed_object import PlacedObject, add_scene, object_id_table
 from riseg_drake.stations.scene import SceneConfig, make_scene
+from riseg_drake.stations.sleep import Sleep
 from riseg_drake.stations.wrist_camera import CameraConfig, ObjectLabels, WristCamera
 
 RENDERER = "renderer"
@@ -200,6 +201,9 @@ class SimulatedStation(Diagram):
         """Index of the body of each object id."""
         self.plant = plant
         self.scene_graph = scene_graph
+        robot, bodies = (panda.arm, panda.pusher), list(world.object_bodies.values())
+        self.sleep = Sleep(plant, scene_graph, robot, bodies, 1 / config.camera.rate)
+        """Asked once a picture, what lies still costs next to nothing."""
 
         self._wire_arm(builder, panda.arm, step)
         scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(config.renderer))
