@@ -138,7 +138,7 @@ class WiredDiagram:
         return self.read("panda.position_measured", context)
 
     def let_sleep(self, context: Context) -> None:
-        """To be called once a picture: a simulation leaves alone what lies still and out of the robot's reach."""
+        """To be called once a picture: what lies still and out of the robot's reach sleeps."""
         if self._sleep is not None:
             self._sleep.look(context)
 

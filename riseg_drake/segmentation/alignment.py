@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.camera import Intrinsics, rays
 from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
 from riseg_drake.geometry.se3 import exp_se3, move_points, translation
+from riseg_drake.kernels.normal_equations import normal_equations
+from riseg_drake.segmentation.expected_flow import pixel_projection
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.noise import MeasurementNoise, depth_sigma
-from riseg_drake.segmentation.surface import Sought, SurfacePixels, seek, surface_pixels
+from riseg_drake.segmentation.surface import SurfacePixels, seek, surface_pixels
 
 _GRADIENT_MIN = 1.0
 """Squared gray gradient of a pixel that tells where it is, in variances of the sensor's noise."""
@@ -141,19 +143,6 @@ def has_contrast(gradient_squared: NDArray[np.float32], noise: MeasurementNoise)
     return gradient_squared > _GRADIENT_MIN * noise.color**2
 
 
-def _by_twist(arm: NDArray, d_p: NDArray) -> NDArray:
-    """Derivatives [N, 6] by a twist, of what changes by d_p [N, 3] with a point that lies at `arm` [N, 3].
-
-    [arm x d_p, d_p]; numpy's own product takes longer to begin than all of a body's pixels.
-    """
-    x, y, z = arm.T
-    a, b, c = d_p.T
-    out = np.empty((len(arm), 6))
-    out[:, 0], out[:, 1], out[:, 2] = y * c - z * b, z * a - x * c, x * b - y * a
-    out[:, 3:] = d_p
-    return out
-
-
 def rigid_fit(pair: FramePair, depth_noise: float) -> "RigidFit":
     """Of the frame of t of a pair; `depth_noise` is that of depth at 1 m, m."""
     current = pair.current
@@ -177,9 +166,12 @@ class RigidFit:
 
     def cost(self, edges: EdgePixels, motion: NDArray) -> NDArray[np.float32]:
         """How badly a motion explains each pixel [N]: 2 where it is right, 18 at most."""
-        gray, depth, _, _ = self._residuals(edges, motion)
-        squared = np.minimum(gray**2, _COST_MAX) + np.minimum(depth**2, _COST_MAX)
-        return np.nan_to_num(squared, nan=2.0)
+        sought = seek(edges.surface, self.X_C1C0 @ motion)
+        z_1 = sought.read(self.depth)
+        gray = np.square(sought.read_between(self.gray) - edges.gray) / edges.variance
+        depth = np.square((z_1 - sought.depth) / depth_sigma(sought.depth, self.depth_noise))
+        squared = np.minimum(gray, _COST_MAX) + np.minimum(depth, _COST_MAX)
+        return np.where(np.isnan(squared) | (z_1 <= 0), np.float32(2), squared)
 
     def align(
         self, edges: EdgePixels, motion: NDArray, rounds: int, parameters: AlignmentParameters
@@ -190,41 +182,32 @@ class RigidFit:
         V, X = np.zeros(6), motion
         for _ in range(rounds):
             normal, rhs = np.diag(precision), -precision * V
-            for residual, J, count in self._linearised(edges, X, centre):
-                weight = 1 / (1 + residual**2 / parameters.outlier) / count
-                # What is not known tells nothing.
-                known = np.isfinite(residual + J.sum(1))
-                if not known.all():
-                    J, weight, residual = J[known], weight[known], residual[known]
-                normal += (J * weight[:, None]).T @ J
-                rhs -= J.T @ (weight * residual)
+            of_pixels, rhs_of_pixels = self._normal_equations(edges, X, centre, parameters.outlier)
+            normal += of_pixels
+            rhs += rhs_of_pixels
             step = np.linalg.solve(normal, rhs)
             V = V + step
             X = translation(centre) @ exp_se3(step) @ translation(-centre) @ X
         return X
 
-    def _linearised(
-        self, edges: EdgePixels, X: NDArray, centre: NDArray
-    ) -> list[tuple[NDArray, NDArray, NDArray | np.float32]]:
-        """Residuals of gray value and depth [N], their derivatives by a twist about the centre [N, 6], and
-        how many pixels of each say the same."""
-        gray, depth, sigma, sought = self._residuals(edges, X)
-        p = move_points(X, edges.p_C0Q)
-        q = move_points(self.X_C1C0, p)
-        g_u, g_v = sought.slope(self.gray) / np.sqrt(edges.variance)
-        along = np.stack([g_u * self.intrinsics.fx, g_v * self.intrinsics.fy], axis=1) / q[:, 2:]
-        R_C1C0 = self.X_C1C0[:3, :3]
-        d_gray = np.column_stack([along, -(along * q[:, :2]).sum(1) / q[:, 2]]) @ R_C1C0
-        d_depth = -R_C1C0[2] / sigma[:, None]
-        return [
-            (residual, _by_twist(p - centre, d_p), count)
-            for residual, d_p, count in ((gray, d_gray, np.float32(1)), (depth, d_depth, edges.alike))
-        ]
-
-    def _residuals(self, edges: EdgePixels, motion: NDArray) -> tuple[NDArray, NDArray, NDArray, Sought]:
-        """Normalised residuals of gray value and depth [N], the latter's sigma (m), and where all that is."""
-        sought = seek(edges.surface, self.X_C1C0 @ motion)
-        gray = (sought.read_between(self.gray) - edges.gray) / np.sqrt(edges.variance)
-        z_1 = sought.read(self.depth)
-        sigma = depth_sigma(sought.depth, self.depth_noise)
-        return gray, np.where(z_1 > 0, (z_1 - sought.depth) / sigma, np.float32(np.nan)), sigma, sought
+    def _normal_equations(
+        self, edges: EdgePixels, X: NDArray, centre: NDArray, outlier: float
+    ) -> tuple[NDArray, NDArray]:
+        """Of a twist about the centre [3], on top of the motion X [4, 4]: [6, 6] and [6]."""
+        k = self.intrinsics
+        return normal_equations(
+            edges.surface.homogeneous,
+            edges.p_C0Q,
+            edges.gray,
+            edges.variance,
+            edges.alike,
+            pixel_projection(self.X_C1C0 @ X, k),
+            np.ascontiguousarray(X),
+            self.X_C1C0,
+            centre,
+            (k.fx, k.fy),
+            self.gray,
+            self.depth,
+            self.depth_noise,
+            outlier,
+        )

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.kernels.misfits import misfits
 from riseg_drake.segmentation.comparison import Comparison
-from riseg_drake.segmentation.lighting import gray_costs
-from riseg_drake.segmentation.noise import depth_sigma
-from riseg_drake.segmentation.surface import seek
+from riseg_drake.segmentation.expected_flow import pixel_projection
 
 _SEEN = 0.25
 """Pixels of motion that an image shows."""
@@ -133,33 +132,23 @@ def _misfit(
     `light`.
     """
     keyframe, frame = compared.keyframe, compared.frame
-    sought = seek(keyframe.witnesses, compared.X_C1K @ motion_K, depth_factor)
-    z_1 = sought.read(frame.unhidden_depth)
-    photometric = gray_costs(
+    projection = pixel_projection(compared.X_C1K @ motion_K, frame.intrinsics)
+    projection[:, 3] /= depth_factor
+    total, lost = misfits(
+        keyframe.witnesses.homogeneous,
         keyframe.gray,
-        sought.read_between(frame.unhidden_gray),
         compared.per_variance,
         keyframe.owner,
-        keyframe.witness_count,
-        parameters.residual_max,
+        keyframe.count,
+        projection,
+        frame.unhidden_gray,
+        frame.unhidden_depth,
+        float(np.sqrt(2)) * compared.depth_noise,
+        compared.depth_error,
         parameters.correlated_gray / light**2,
+        parameters.correlated_gray / parameters.correlated_depth,
+        parameters.residual_max,
+        EXPECTED,
     )
-    z = sought.depth / np.float32(depth_factor)  # as it is measured
-    noise = float(np.sqrt(2)) * compared.depth_noise
-    variance = np.square(depth_sigma(z, noise))
-    variance += np.square(np.float32(compared.depth_error) * z)
-    geometric = np.square(z_1 - z)
-    geometric /= variance
-    np.minimum(geometric, np.float32(parameters.residual_max), out=geometric)
-    # Against what is right: depth that is not there says neither.
-    geometric -= 1
-    geometric *= np.float32(parameters.correlated_gray / parameters.correlated_depth)
-    geometric *= z_1 > 0
-    both = photometric + geometric
-    both += 1
-    lost = np.flatnonzero(np.isnan(both))
-    both[lost] = EXPECTED
-    total = np.bincount(keyframe.owner, both, keyframe.count)
-    witnesses = keyframe.witness_count
-    misfit = np.divide(total, witnesses, out=np.full(keyframe.count, EXPECTED), where=witnesses > 0)
-    return misfit, keyframe.share_of_witnesses(lost)
+    witnesses = np.maximum(keyframe.witness_count, 1)
+    return np.where(keyframe.witness_count > 0, total / witnesses, EXPECTED), lost / witnesses

@@ -117,9 +117,11 @@ class Sleep:
     ) -> bool:
         """Whether a shape of a part of the robot may touch another by the next look, as it moves now."""
         closest = query.ComputeSignedDistancePairClosestPoints(shape, thing)
-        p_WQ = query.GetPoseInWorld(shape) @ closest.p_ACa
+        own = closest.id_A == shape  # Drake puts them in the order of their ids
+        p_WQ = query.GetPoseInWorld(shape) @ (closest.p_ACa if own else closest.p_BCb)
         X_WP, V_WP = part.EvalPoseInWorld(context), part.EvalSpatialVelocityInWorld(context)
-        closing = -V_WP.Shift(p_WQ - X_WP.translation()).translational() @ closest.nhat_BA_W
+        leaving = V_WP.Shift(p_WQ - X_WP.translation()).translational() @ closest.nhat_BA_W
+        closing = -leaving if own else leaving
         return bool(closest.distance < ROOM + self._period * (max(closing, 0.0) + SUDDEN))
 
 

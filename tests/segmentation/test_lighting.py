@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from riseg_drake.segmentation.lighting import gray_costs
 
 SIGMA = 3.0

@@ -1,0 +1,120 @@
+"""Greedy additive edge contraction, `segmentation.multicut`."""
+
+from heapq import heapify, heappop, heappush
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.kernels.compiled import compiled
+
+
+@compiled
+def contract(
+    nodes: int,
+    edges: NDArray[np.intp],
+    weight: NDArray[np.float64],
+    cost: NDArray[np.float64],
+    free: float,
+) -> NDArray[np.intp]:
+    """For each node [nodes] one that stands for its part.
+
+    Args:
+        nodes: how many.
+        edges: [M, 2], pairs of nodes, each once.
+        weight: [M], log-odds that both ends are one; renewed in place.
+        cost: [nodes, G], how badly each of G motions explains each node, nats; renewed in place. G may be 0.
+        free: nats that it may cost two parts to have one motion.
+    """
+    # Edge e has two ends, 2 e and 2 e + 1; `at` says at which part, and each part has a list of its ends.
+    at, after = edges.copy().ravel(), np.full(2 * len(weight), -1)
+    first, degree, size, parent = (
+        np.full(nodes, -1),
+        np.zeros(nodes, np.intp),
+        np.ones(nodes, np.intp),
+        np.arange(nodes),
+    )
+    gone, refused = np.zeros(len(weight), np.bool_), np.zeros(len(weight), np.bool_)
+    beside = np.full(nodes, -1)
+    lowest = np.zeros(nodes)
+    for a in range(nodes):
+        if cost.shape[1]:
+            lowest[a] = cost[a].min()
+    # What a pair of parts gains: at first its bond, with sizes 0, and what remains of it once its motions were
+    # looked at, with the sizes of both: a part whose size is the same is the same part.
+    queue = [(0.0, 0, 0, 0, 0, 0)]
+    queue.pop()
+    for e in range(len(weight)):
+        for end in (2 * e, 2 * e + 1):
+            after[end] = first[at[end]]
+            first[at[end]] = end
+            degree[at[end]] += 1
+        if weight[e] > 0:
+            queue.append((-weight[e], min(at[2 * e], at[2 * e + 1]), max(at[2 * e], at[2 * e + 1]), e, 0, 0))
+    heapify(queue)
+    while len(queue):
+        negative, a, b, e, size_a, size_b = heappop(queue)
+        if gone[e] or min(at[2 * e], at[2 * e + 1]) != a or max(at[2 * e], at[2 * e + 1]) != b:
+            continue  # one of the two is part of another by now
+        if size_a != size[a] or size_b != size[b]:
+            if size_a == 0 and weight[e] != -negative:
+                continue  # their bond has changed
+            lost = -1.0
+            if cost.shape[1]:
+                shared = cost[a, 0] + cost[b, 0]
+                for g in range(1, cost.shape[1]):
+                    shared = min(shared, cost[a, g] + cost[b, g])
+                lost = shared - lowest[a] - lowest[b] - free
+            if lost > 0:
+                if weight[e] > lost:
+                    heappush(queue, (lost - weight[e], a, b, e, size[a], size[b]))
+                else:
+                    refused[e] = True
+                continue
+        if degree[a] < degree[b]:
+            a, b = b, a
+        parent[b] = a
+        size[a] += size[b]
+        for g in range(cost.shape[1]):
+            cost[a, g] += cost[b, g]
+        if cost.shape[1]:
+            lowest[a] = cost[a].min()
+        gone[e] = True
+        # The edges of b become those of a, or join those that a has; what had been refused may be asked again.
+        end, first[a], degree[a] = first[a], -1, 0
+        while end >= 0:
+            following = after[end]
+            if not gone[end // 2]:
+                beside[at[end ^ 1]] = end
+                after[end], first[a] = first[a], end
+                degree[a] += 1
+            end = following
+        end, first[b] = first[b], -1
+        while end >= 0:
+            following, c = after[end], at[end ^ 1]
+            if not gone[end // 2]:
+                if beside[c] >= 0:
+                    gone[end // 2] = True
+                    degree[c] -= 1
+                    weight[beside[c] // 2] += weight[end // 2]
+                    end = beside[c]
+                else:
+                    at[end] = a
+                    after[end], first[a] = first[a], end
+                    degree[a] += 1
+                refused[end // 2] = False
+                if weight[end // 2] > 0:
+                    heappush(queue, (-weight[end // 2], min(a, c), max(a, c), end // 2, 0, 0))
+            end = following
+        end = first[a]
+        while end >= 0:
+            c = at[end ^ 1]
+            beside[c] = -1
+            if refused[end // 2]:
+                refused[end // 2] = False
+                if weight[end // 2] > 0:
+                    heappush(queue, (-weight[end // 2], min(a, c), max(a, c), end // 2, 0, 0))
+            end = after[end]
+    for a in range(nodes):
+        while parent[a] != parent[parent[a]]:
+            parent[a] = parent[parent[a]]
+    return parent

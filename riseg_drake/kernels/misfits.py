@@ -1,0 +1,85 @@
+"""How badly a rigid motion explains each superpixel, `segmentation.likelihood`."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.kernels.compiled import compiled
+from riseg_drake.kernels.reading import between, nearest, projected
+
+
+@compiled
+def misfits(
+    pixel: NDArray[np.float32],
+    gray: NDArray[np.float32],
+    per_variance: NDArray[np.float32],
+    owner: NDArray[np.intp],
+    count: int,
+    M: NDArray[np.float32],
+    gray_1: NDArray[np.float32],
+    depth_1: NDArray[np.float32],
+    depth_noise: float,
+    depth_error: float,
+    certainty: float,
+    per_depth: float,
+    most: float,
+    expected: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Summed squared residuals of the witnesses of N superpixels, and how many cannot be compared, both [N].
+
+    What turns is shaded anew, and shadows come and go: a surface becomes darker by one factor and keeps its
+    pattern. So the gray values of each superpixel may have changed by a factor, where that is likelier.
+
+    Args:
+        pixel: [4, W or more], (u, v, 1, 1 / z) of W witnesses.
+        gray: [W], their gray values.
+        per_variance: [W], 1 / variance of the difference between that and where it should reappear.
+        owner: [W], 0..N-1, the superpixel of each.
+        count: N.
+        M: [3, 4], see `pixel_projection`.
+        gray_1: [H, W], of the other view; NaN where there is nothing to compare.
+        depth_1: [H, W], m; 0 where there is none.
+        depth_noise: of the difference of two depths at 1 m, m.
+        depth_error: share of depth by which it errs besides.
+        certainty: 1 / variance of the factor, in the measure of a superpixel's squared residuals.
+        per_depth: what a squared residual of depth counts beside one of gray.
+        most: squared residuals count no more than that.
+        expected: what a witness counts that cannot be compared.
+    """
+    total, known, lost = np.zeros(count), np.zeros(count), np.zeros(count)
+    before_after, before_before, of_gray = np.zeros(count), np.zeros(count), np.zeros(count)
+    after = np.empty(len(gray), np.float32)
+    for n in range(len(gray)):
+        p = owner[n]
+        u, v, c = projected(M, pixel, n)
+        after[n] = between(gray_1, u, v)
+        if np.isnan(after[n]):
+            lost[p] += 1
+            total[p] += expected
+            continue
+        known[p] += 1
+        weighted = per_variance[n] * gray[n]
+        before_after[p] += weighted * after[n]
+        before_before[p] += weighted * gray[n]
+        of_gray[p] += min(per_variance[n] * (after[n] - gray[n]) ** 2, most)
+        total[p] += 1
+        z_1 = nearest(depth_1, u, v)
+        if z_1 > 0:
+            z = c / pixel[3, n]
+            variance = (depth_noise * z * z) ** 2 + (depth_error * z) ** 2
+            # Against what is right: depth that is not there says neither.
+            total[p] += per_depth * (min((z_1 - z) ** 2 / variance, most) - 1)
+    # The likeliest factor, by least squares, where the light seems to have changed; it costs once.
+    factor, of_factor = np.ones(count), np.zeros(count)
+    for p in range(count):
+        if of_gray[p] > 0.5 * known[p]:
+            factor[p] = (before_after[p] + certainty) / (before_before[p] + certainty)
+            of_factor[p] = certainty * (factor[p] - 1) ** 2
+    for n in range(len(gray)):
+        p = owner[n]
+        if factor[p] != 1 and not np.isnan(after[n]):
+            # With it the noise of the first image is amplified.
+            noise = max(factor[p], 1.0) ** 2
+            of_factor[p] += min(per_variance[n] * (after[n] - factor[p] * gray[n]) ** 2 / noise, most)
+    for p in range(count):
+        total[p] += min(of_gray[p], of_factor[p]) if factor[p] != 1 else of_gray[p]
+    return total, lost
