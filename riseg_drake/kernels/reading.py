@@ -1,13 +1,17 @@
 """Reading an image between and at its pixels, as OpenCV's remap does."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.kernels.compiled import compiled
 
+Real = float | np.floating[Any]
+
 
 @compiled
-def between(image: NDArray[np.float32], u: float, v: float) -> float:
+def between(image: NDArray[np.float32], u: Real, v: Real) -> Real:
     """The value of an image [H, W] at a place, bilinear; NaN beyond its edges and beside any NaN."""
     if not (u >= 0 and v >= 0 and u < image.shape[1] - 1 and v < image.shape[0] - 1):
         return np.float32(np.nan)
@@ -19,7 +23,7 @@ def between(image: NDArray[np.float32], u: float, v: float) -> float:
 
 
 @compiled
-def nearest(image: NDArray[np.float32], u: float, v: float) -> float:
+def nearest(image: NDArray[np.float32], u: Real, v: Real) -> Real:
     """The value of the pixel of an image [H, W] that is nearest to a place; 0 beyond its edges."""
     if not (u >= -0.5 and v >= -0.5 and u < image.shape[1] - 0.5 and v < image.shape[0] - 0.5):
         return np.float32(0)
@@ -27,11 +31,9 @@ def nearest(image: NDArray[np.float32], u: float, v: float) -> float:
 
 
 @compiled
-def projected(
-    M: NDArray[np.float32], pixel: NDArray[np.float32], n: int
-) -> tuple[np.float32, np.float32, np.float32]:
-    """(u, v) of pixel n of `pixel` [4, N], (u, v, 1, 1 / z), in another view by M [3, 4], see `pixel_projection`,
-    and by what its depth grows; NaN for points that are not ahead."""
+def projected(M: NDArray[np.float32], pixel: NDArray[np.float32], n: int) -> tuple[Real, Real, Real]:
+    """Where pixel n of `pixel` [4, N], (u, v, 1, 1 / z), is in another view by M [3, 4], `pixel_projection`:
+    u, v, and by what factor its depth has grown; NaN for a point that is not ahead."""
     u, v, per_z = pixel[0, n], pixel[1, n], pixel[3, n]
     c = M[2, 0] * u + M[2, 1] * v + M[2, 2] + M[2, 3] * per_z
     if not c > 0:

@@ -27,7 +27,8 @@ def multicut(
     each, which = np.unique(pair, return_inverse=True)
     cost = np.zeros((nodes, 0)) if nats is None or len(nats) < 2 else np.array(nats.T, np.float64, order="C")
     once = np.stack(np.divmod(each, nodes), axis=1)
-    stands_for = contract(nodes, once, np.bincount(which, weight, len(each)), cost, free)
+    bond = np.asarray(np.bincount(which, weight, len(each)), np.float64)
+    stands_for = contract(nodes, once, bond, cost, free)
     return np.unique(stands_for, return_inverse=True)[1]
 
 

@@ -20,7 +20,7 @@ from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.likelihood import LikelihoodParameters, motion_costs
 from riseg_drake.segmentation.motions import flow_difference
-from riseg_drake.segmentation.potts import potts_labels
+from riseg_drake.segmentation.potts import PottsGraph, potts_labels
 
 
 @dataclass
@@ -175,12 +175,13 @@ def _fewest_motions(
 ) -> tuple[list[int], NDArray[np.intp]]:
     """The motions that are needed, and which of these each superpixel [N] has; drops the others one by one."""
     coupling = parameters.border * np.maximum(bond, parameters.border_least) * keyframe.length
+    graph = PottsGraph(keyframe.count, keyframe.borders, coupling)
     needed, message = list(range(len(nats))), None
     nats_of_parts = np.array([np.bincount(part, n) for n in nats])
     while True:
         unary = nats[needed].astype(np.float32)
         unary[1:] += np.float32(parameters.still)
-        motion, message = potts_labels(unary, keyframe.borders, coupling, message)
+        motion, message = potts_labels(unary, graph, message)
         gains, of_parts = [], nats_of_parts[needed]
         for k in range(1, len(needed)):
             mine = nats[np.ix_(needed, motion == k)]

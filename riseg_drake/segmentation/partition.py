@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.multicut import loss, multicut
-from riseg_drake.segmentation.potts import potts_labels
+from riseg_drake.segmentation.potts import PottsGraph, potts_labels
 
 _NEVER = 1e3
 """Nats that a superpixel would cost in a part that is not beside its own."""
@@ -87,7 +87,7 @@ def redrawn(
     may_be = (np.eye(len(motion), dtype=bool) | beside)[np.ix_(asked, part[mine])]
     own = nats[:, mine]
     unary = np.where(may_be, own[motion[asked]], _NEVER)
-    label, _ = potts_labels(unary.astype(np.float32), edges, np.maximum(coupling, 0.0))
+    label, _ = potts_labels(unary.astype(np.float32), PottsGraph(len(mine), edges, np.maximum(coupling, 0.0)))
 
     def energy(label: NDArray[np.intp]) -> float:
         cut = label[edges[:, 0]] != label[edges[:, 1]]

@@ -3,16 +3,31 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.kernels.messages import pass_messages
 
-_LEAST_CHANGE = 0.01
-"""A message that changes by less is at its end."""
+class PottsGraph:
+    """N nodes and the borders between them, in the order in which messages travel."""
+
+    def __init__(self, nodes: int, edges: NDArray[np.intp], weight: NDArray[np.float64]) -> None:
+        """Borders [M, 2] between pairs of nodes, and what different labels at their ends cost [M] (>= 0)."""
+        alone = np.setdiff1d(np.arange(nodes), edges)
+        both = np.concatenate([edges, edges[:, ::-1], np.stack([alone, alone], axis=1)])
+        M = len(edges)
+        twin = np.concatenate([np.arange(M, 2 * M), np.arange(M), np.arange(2 * M, len(both))])
+        # Sorted by target, so that what arrives at a node is summed over neighbouring places.
+        order = np.argsort(both[:, 1], kind="stable")
+        place = np.empty(len(order), np.intp)
+        place[order] = np.arange(len(order))
+        self.source = both[order, 0]
+        self.twin = place[twin[order]]
+        """The message that travels the other way."""
+        self.weight = np.concatenate([weight, weight, np.zeros(len(alone))])[order].astype(np.float32)
+        self.first = np.searchsorted(both[order, 1], np.arange(nodes))
+        """Where the messages to each node begin; a node without borders has one from itself, worth 0."""
 
 
 def potts_labels(
     unary: NDArray[np.float32],
-    edges: NDArray[np.intp],
-    weight: NDArray[np.float64],
+    graph: PottsGraph,
     message: NDArray[np.float32] | None = None,
     rounds: int = 30,
 ) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
@@ -22,17 +37,25 @@ def potts_labels(
 
     Args:
         unary: [L, N], cost of each label at each node.
-        edges: [M, 2], pairs of nodes.
-        weight: [M], what different labels at both ends cost, >= 0.
-        message: [L, 2 M] to start from, of a problem much like this one; nothing said yet if None.
+        graph: the nodes and what their borders cost.
+        message: [L, messages] to start from, of a problem much like this one; nothing said yet if None.
         rounds: of message passing, at most.
 
     Returns:
         x, and the messages at the end.
     """
-    message = np.zeros((len(unary), 2 * len(edges)), np.float32) if message is None else message
-    passed = np.array(message.T, np.float32, order="C")
-    costs = np.array(unary.T, np.float32, order="C")
-    borders = np.ascontiguousarray(edges, np.intp)
-    belief = pass_messages(costs, borders, weight.astype(np.float32), passed, rounds, _LEAST_CHANGE)
-    return belief.argmin(1), passed.T
+    message = np.zeros((len(unary), len(graph.source)), np.float32) if message is None else message.copy()
+    belief = unary + np.add.reduceat(message, graph.first, axis=1)
+    for _ in range(rounds):
+        outgoing = belief.take(graph.source, axis=1)
+        outgoing -= message.take(graph.twin, axis=1)
+        outgoing -= outgoing.min(axis=0)
+        np.minimum(outgoing, graph.weight, out=outgoing)
+        # Half a step: messages that all change at once may swing for ever.
+        outgoing -= message
+        outgoing *= np.float32(0.5)
+        message += outgoing
+        belief = unary + np.add.reduceat(message, graph.first, axis=1)
+        if max(outgoing.max(), -outgoing.min()) < 1e-2:
+            break
+    return belief.argmin(0), message

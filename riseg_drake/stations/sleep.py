@@ -59,7 +59,9 @@ class Sleep:
         self._joints = [joint for joint in joints if joint.child_body().index() in set(bodies)]
         parts = [plant.get_body(index) for instance in robot for index in plant.GetBodyIndices(instance)]
         shapes = plant.GetCollisionGeometriesForBody
-        self._robot = [(part, shape) for part in parts for shape in shapes(part)]
+        self._robot: list[tuple[RigidBody, GeometryId]] = [
+            (part, shape) for part in parts for shape in shapes(part)
+        ]
         self._things = [shape for body in self._bodies for shape in shapes(body)]
         inspector = scene_graph.model_inspector()
         every = [*(shape for _, shape in self._robot), *self._things]
@@ -107,15 +109,12 @@ class Sleep:
         robot, things = slice(len(self._robot)), slice(len(self._robot), None)
         gap = np.linalg.norm(middle_W[robot, None] - middle_W[None, things], axis=2)
         gap -= radius[robot, None] + radius[things]
-        return any(
-            self._touches(context, query, *self._robot[a], self._things[b])
-            for a, b in np.argwhere(gap < ROOM + self._period * (FASTEST + SUDDEN))
-        )
+        pairs = np.argwhere(gap < ROOM + self._period * (FASTEST + SUDDEN))
+        return any(self._may_touch(context, query, a, b) for a, b in pairs)
 
-    def _touches(
-        self, context: Context, query: QueryObject, part: RigidBody, shape: GeometryId, thing: GeometryId
-    ) -> bool:
-        """Whether a shape of a part of the robot may touch another by the next look, as it moves now."""
+    def _may_touch(self, context: Context, query: QueryObject, a: int, b: int) -> bool:
+        """Whether shape a of the robot may touch shape b of the things by the next look, as it moves now."""
+        part, shape, thing = *self._robot[a], self._things[b]
         closest = query.ComputeSignedDistancePairClosestPoints(shape, thing)
         own = closest.id_A == shape  # Drake puts them in the order of their ids
         p_WQ = query.GetPoseInWorld(shape) @ (closest.p_ACa if own else closest.p_BCb)

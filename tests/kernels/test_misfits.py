@@ -1,0 +1,140 @@
+"""A surface in another light is darker or brighter by one factor and keeps its pattern; depth is asked, too."""
+
+import cv2
+import numpy as np
+import pytest
+
+from riseg_drake.kernels.misfits import misfits
+
+SIGMA = 3.0
+PIECE = np.repeat([0, 1], 400)
+CERTAINTY = 2400.0
+"""6 / 0.05^2: a factor of 0.95 or 1.05 costs 6 squared residuals."""
+MOST, EXPECTED, PER_DEPTH = 9.0, 2.0, 0.25
+NO_DEPTH = np.zeros((21, 41), np.float32)
+ONTO_ITSELF = np.eye(3, 4, dtype=np.float32)
+
+
+def pixels(count: int = 800) -> np.ndarray:
+    """[4, count], row by row of an image of 40 columns, 0.5 m away."""
+    v, u = np.divmod(np.arange(count), 40)
+    return np.stack([u, v, np.ones(count), np.full(count, 2.0)]).astype(np.float32)
+
+
+def image(values: np.ndarray) -> np.ndarray:
+    """Values [800] at those pixels, and a row and a column beyond."""
+    return np.pad(values.reshape(20, 40), ((0, 1), (0, 1)), mode="edge").astype(np.float32)
+
+
+def pattern(seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(60, 180, len(PIECE)).astype(np.float32)
+
+
+def noise(seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).normal(0, SIGMA, len(PIECE)).astype(np.float32)
+
+
+def costs(before: np.ndarray, after: np.ndarray, certainty: float = CERTAINTY) -> np.ndarray:
+    """Of the gray values [2], where all pixels are seen again at their places."""
+    per_variance = np.full(len(before), 1 / SIGMA**2, np.float32)
+    total, lost = misfits(
+        pixels(), before, per_variance, PIECE, 2, ONTO_ITSELF, image(after), NO_DEPTH,
+        0.003, 0.0, certainty, PER_DEPTH, MOST, EXPECTED,
+    )  # fmt: skip
+    np.testing.assert_array_equal(lost, 0)
+    return total - np.bincount(PIECE)
+
+
+def test_where_the_light_never_changes_the_cost_is_the_squared_residual() -> None:
+    before, e = pattern(0), noise(1)
+    of_noise = np.bincount(PIECE, np.minimum((e / SIGMA) ** 2, MOST))
+    np.testing.assert_allclose(costs(before, before + e, certainty=1e12), of_noise, rtol=1e-4)
+
+
+@pytest.mark.parametrize("light", [0.4, 0.8, 1.05])
+def test_a_piece_in_another_light_costs_what_noise_does_and_once_the_price_of_that_light(light: float) -> None:
+    before, e = pattern(0), noise(1)
+    cost = costs(before, np.where(PIECE == 0, light, 1).astype(np.float32) * before + e)
+    of_noise = np.bincount(PIECE, np.minimum((e / SIGMA) ** 2, MOST))
+    price = CERTAINTY * (1 - light) ** 2
+    assert cost[0] == pytest.approx(of_noise[0] / max(light, 1) ** 2 + price, rel=0.02)
+    assert cost[1] == pytest.approx(of_noise[1], rel=0.02)
+
+
+def test_the_factor_is_the_likeliest_one() -> None:
+    # One pixel that went from 100 to 90: (90 - 100 f)^2 + c (f - 1)^2 is least at f = (9000 + c) / (10000 + c).
+    before, ones = np.full(800, 100, np.float32), np.ones(800, np.float32)
+    after = before.copy()
+    after[0] = 90
+    total, _ = misfits(
+        pixels(), before, ones, np.arange(800), 800, ONTO_ITSELF, image(after), NO_DEPTH,
+        0.003, 0.0, 1e4, PER_DEPTH, 1e4, EXPECTED,
+    )  # fmt: skip
+    assert total[0] - 1 == pytest.approx((90 - 95) ** 2 + 1e4 * 0.05**2)
+    np.testing.assert_array_equal(total[1:], 1)
+
+
+def test_another_pattern_is_explained_by_no_light() -> None:
+    assert costs(pattern(0), pattern(2)).sum() / len(PIECE) > 6
+
+
+def test_what_was_not_found_counts_as_expected_and_says_nothing_about_the_rest() -> None:
+    before = pattern(0)
+    after = image(0.5 * before + noise(1))
+    after[5:8] = np.nan  # rows 4 to 7 cannot be read between pixels
+    total, lost = misfits(
+        pixels(), before, np.full(800, 1 / SIGMA**2, np.float32), PIECE, 2, ONTO_ITSELF, after, NO_DEPTH,
+        0.003, 0.0, CERTAINTY, PER_DEPTH, MOST, EXPECTED,
+    )  # fmt: skip
+    np.testing.assert_array_equal(lost, [160, 0])
+    assert total[0] == pytest.approx(160 * EXPECTED + 240 * 2 + CERTAINTY * 0.25, rel=0.1)
+
+
+@pytest.mark.parametrize(("nearer", "error"), [(0.0, 0.0), (0.001, 0.0), (0.001, 0.01), (0.1, 0.0)])
+def test_depth_costs_its_squared_residual_less_what_is_right(nearer: float, error: float) -> None:
+    before = pattern(0)
+    depth = np.full((21, 41), 0.5 - nearer, np.float32)
+    total, _ = misfits(
+        pixels(), before, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, image(before), depth,
+        0.004, error, CERTAINTY, PER_DEPTH, MOST, EXPECTED,
+    )  # fmt: skip
+    squared = nearer**2 / ((0.004 * 0.25) ** 2 + (error * 0.5) ** 2)
+    np.testing.assert_allclose(total / 400, 1 + PER_DEPTH * (min(squared, MOST) - 1), rtol=1e-3)
+
+
+def test_under_any_motion_it_is_what_numpy_and_opencv_find() -> None:
+    rng = np.random.default_rng(3)
+    gray_1 = cv2.GaussianBlur(rng.uniform(0, 255, (60, 80)).astype(np.float32), (0, 0), 3) * 3
+    depth_1 = rng.uniform(0.49, 0.51, (60, 80)).astype(np.float32)
+    gray_1[20:30, 40:50] = np.nan
+    depth_1[:, :10] = 0
+    u, v = rng.uniform(0, 79, 900), rng.uniform(0, 59, 900)
+    pixel = np.stack([u, v, np.ones(900), 1 / rng.uniform(0.49, 0.51, 900)]).astype(np.float32)
+    gray, owner = rng.uniform(100, 160, 900).astype(np.float32), np.sort(rng.integers(0, 12, 900))
+    per_variance = rng.uniform(0.01, 0.1, 900).astype(np.float32)
+    M = np.array([[1.02, 0.03, -2, 1.2], [-0.02, 0.98, 3, -0.8], [1e-4, -1e-4, 1, 0.004]], np.float32)
+    total, lost = misfits(
+        pixel, gray, per_variance, owner, 12, M, gray_1, depth_1,
+        0.003, 0.002, CERTAINTY, PER_DEPTH, MOST, EXPECTED,
+    )  # fmt: skip
+
+    a, b, c = M @ pixel
+    u_1, v_1 = (a / c)[None], (b / c)[None]
+    after = cv2.remap(gray_1, u_1, v_1, cv2.INTER_LINEAR, borderMode=0, borderValue=np.nan)[0]
+    z_1 = cv2.remap(depth_1, u_1, v_1, cv2.INTER_NEAREST, borderMode=0, borderValue=0)[0]
+    z = c / pixel[3]
+    known = np.isfinite(after)
+    np.testing.assert_allclose(lost, np.bincount(owner, ~known), atol=1)  # OpenCV reads at 1/32 of a pixel
+    expected = np.zeros(12)
+    for p in range(12):
+        mine = known & (owner == p)
+        w, x, y = per_variance[mine], gray[mine], after[mine]
+        of_gray = np.minimum(w * (y - x) ** 2, MOST).sum()
+        if of_gray > 0.5 * mine.sum():
+            f = (np.sum(w * x * y) + CERTAINTY) / (np.sum(w * x * x) + CERTAINTY)
+            other = np.minimum(w * (y - f * x) ** 2 / max(f, 1) ** 2, MOST).sum() + CERTAINTY * (f - 1) ** 2
+            of_gray = min(of_gray, other)
+        squared = (z_1 - z) ** 2 / ((0.003 * z**2) ** 2 + (0.002 * z) ** 2)
+        of_depth = PER_DEPTH * (np.minimum(squared, MOST) - 1)[mine & (z_1 > 0)].sum()
+        expected[p] = of_gray + of_depth + mine.sum() + EXPECTED * np.sum(~known & (owner == p))
+    np.testing.assert_allclose(total, expected, rtol=0.02)
