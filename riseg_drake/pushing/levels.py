@@ -50,7 +50,7 @@ def raised(
     """
     for a in np.unique(things[things > 0]):
         thing = things == a
-        level = _level(thing, table, parameters)
+        level = _level(thing, table, minimum_area, parameters)
         if level is None:
             continue
         standing = table.objects & (table.height > level)
@@ -71,8 +71,13 @@ def raised(
             )
 
 
-def _level(thing: NDArray[np.bool_], table: TableMap, parameters: LevelsParameters) -> float | None:
-    """The height, m, that most steps within a thing [rows, columns] straddle; None where there is no step."""
+def _level(
+    thing: NDArray[np.bool_], table: TableMap, minimum_area: float, parameters: LevelsParameters
+) -> float | None:
+    """The lowest height, m, at which a thing [rows, columns] has steps as long as the smallest object is wide.
+
+    What is pushed near its top tilts, and falls back when it is let go. None where no steps are so long.
+    """
     low, high = [], []
     for axis in (0, 1):
         inside, height = np.moveaxis(thing, axis, 0), np.moveaxis(table.height, axis, 0)
@@ -87,7 +92,8 @@ def _level(thing: NDArray[np.bool_], table: TableMap, parameters: LevelsParamete
     # The number of steps around a level changes only where one of them begins or ends.
     levels = np.sort(first[steps])
     around = np.searchsorted(levels, levels, side="right") - np.searchsorted(np.sort(last[steps]), levels)
-    return float(levels[int(around.argmax())])
+    enough = around >= _APART * np.sqrt(minimum_area) / table.cell
+    return float(levels[enough.argmax()]) if enough.any() else None
 
 
 def _width(thing: NDArray[np.bool_], table: TableMap) -> float:

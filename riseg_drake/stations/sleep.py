@@ -23,8 +23,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, ModelInstanceIndex, RigidBody
 from pydrake.systems.framework import Context
 
-STILL = (2e-5, 2e-4)
-"""m/s and rad/s below which a body may sleep: a tenth of what is called rest while a scene settles."""
+from riseg_drake.stations.settling import STILL
+
 ROOM = 0.003
 """m to the robot within which a body is awake, ..."""
 SUDDEN = 0.05

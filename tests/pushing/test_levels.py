@@ -47,12 +47,20 @@ def test_the_upper_box_is_pushed_just_above_the_lower_one(drawn):
     assert np.linalg.norm(push.p_WE[:2] - [0.52, 0.01]) < 0.06
 
 
-def test_of_two_levels_that_with_the_longer_edge_is_taken(drawn):
-    stack(drawn).box(0.46, -0.03, 0.02, 0.02, height=0.16, doubtful=1)
+def test_of_two_levels_the_lower_is_taken_though_the_edge_at_the_higher_is_longer(drawn):
+    # At the large box's corner only half of what stands there rises from the same thing.
+    drawn.box(0.5, 0.0, 0.12, 0.10, height=0.04, doubtful=1)
+    drawn.box(0.535, 0.025, 0.05, 0.05, height=0.08, doubtful=1)
+    drawn.box(0.535, 0.025, 0.04, 0.04, height=0.12, doubtful=1)
     [(upper, above)] = levels(drawn)
     assert above.ground(np.array([[0.5, 0.0]])) == pytest.approx(0.044, abs=1e-6)
-    assert above.segmented.sum() == 0
     assert upper.sum() == (drawn.height > 0.05).sum()
+
+
+def test_a_step_shorter_than_the_smallest_object_makes_no_level(drawn):
+    stack(drawn).box(0.46, -0.03, 0.004, 0.004, height=0.03, doubtful=1)  # a hole, 1.6 cm around
+    [(_, above)] = levels(drawn)
+    assert above.ground(np.array([[0.5, 0.0]])) == pytest.approx(0.044, abs=1e-6)
 
 
 @pytest.mark.parametrize(
