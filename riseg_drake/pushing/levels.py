@@ -50,50 +50,50 @@ def raised(
     """
     for a in np.unique(things[things > 0]):
         thing = things == a
-        level = _level(thing, table, minimum_area, parameters)
-        if level is None:
-            continue
-        standing = table.objects & (table.height > level)
-        upper, lower = thing & standing, thing & ~standing
-        area = table.cell_area * min(np.count_nonzero(upper), np.count_nonzero(lower))
         # Should it be one thing, it may fall over: pushed at its top, once it has gone as far as it is wide.
-        if area >= minimum_area and _width(thing, table) >= 2 * d_push:
-            yield (
-                upper,
-                replace(
-                    table,
-                    objects=standing,
-                    segmented=standing & ~upper,
-                    height=np.where(standing, table.height - np.float32(level), np.float32(0)),
-                    plane_W=table.plane_W - np.array([0.0, 0.0, 0.0, level]),
-                    doubtful=None,
-                ),
-            )
+        if _width(thing, table) < 2 * d_push:
+            continue
+        for level in _levels(thing, table, minimum_area, parameters):
+            standing = table.objects & (table.height > level)
+            upper, lower = thing & standing, thing & ~standing
+            if table.cell_area * min(np.count_nonzero(upper), np.count_nonzero(lower)) >= minimum_area:
+                yield (
+                    upper,
+                    replace(
+                        table,
+                        objects=standing,
+                        segmented=standing & ~upper,
+                        height=np.where(standing, table.height - np.float32(level), np.float32(0)),
+                        plane_W=table.plane_W - np.array([0.0, 0.0, 0.0, level]),
+                        doubtful=None,
+                    ),
+                )
 
 
-def _level(
+def _levels(
     thing: NDArray[np.bool_], table: TableMap, minimum_area: float, parameters: LevelsParameters
-) -> float | None:
-    """The lowest height, m, at which a thing [rows, columns] has steps as long as the smallest object is wide.
+) -> list[float]:
+    """Heights, m, rising, just above what a thing [rows, columns] rises from, along the smallest object's width.
 
-    What is pushed near its top tilts, and falls back when it is let go. None where no steps are so long.
+    The lowest comes first: what is pushed near its top tilts, and falls back when it is let go.
     """
     low, high = [], []
     for axis in (0, 1):
         inside, height = np.moveaxis(thing, axis, 0), np.moveaxis(table.height, axis, 0)
-        both = inside[_APART:] & inside[:-_APART]
-        ends = np.stack([height[_APART:][both], height[:-_APART][both]])
-        low.append(ends.min(0) + parameters.over)
-        high.append(ends.max(0) - (parameters.step - parameters.over))
-    first, last = np.concatenate(low), np.concatenate(high)
-    steps = first <= last
-    if not steps.any():
-        return None
-    # The number of steps around a level changes only where one of them begins or ends.
-    levels = np.sort(first[steps])
-    around = np.searchsorted(levels, levels, side="right") - np.searchsorted(np.sort(last[steps]), levels)
-    enough = around >= _APART * np.sqrt(minimum_area) / table.cell
-    return float(levels[enough.argmax()]) if enough.any() else None
+        ends = np.stack([height[_APART:], height[:-_APART]])
+        rises = np.where(ends[0] > ends[1], inside[_APART:], inside[:-_APART])
+        low.append(ends.min(0)[rises])
+        high.append(ends.max(0)[rises])
+    foot, top = np.concatenate(low), np.concatenate(high)
+    feet = np.sort(foot[top - foot >= parameters.step])
+    least = max(1, round(_APART * float(np.sqrt(minimum_area)) / table.cell))
+    levels: list[float] = []
+    # Where so many steps begin within the depth's error.
+    for lowest, highest in zip(feet, feet[least - 1 :], strict=False):
+        level = float(highest) + parameters.over
+        if highest - lowest <= parameters.over and (not levels or level >= levels[-1] + parameters.step):
+            levels.append(level)
+    return levels
 
 
 def _width(thing: NDArray[np.bool_], table: TableMap) -> float:
