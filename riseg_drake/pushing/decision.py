@@ -36,6 +36,7 @@ class Criterion(Enum):
     HIGH_ENOUGH = "the bar would have to come too close to the table"
     ONLY_TARGET = "the bar would meet other things, too"
     STAYS_IN_WORK_AREA = "the cluster would be driven out of the work area"
+    STAYS_ON_TOP = "the cluster would be pushed off what it lies on"
     NOT_IN_VAIN = "too little is to be expected of it, or it was tried before"
 
 

@@ -213,6 +213,7 @@ def valid_pushes_of(
         Criterion.HIGH_ENOUGH: contacts.high_enough,
         Criterion.ONLY_TARGET: contacts.only_target & (contacts.transmitted > 0),
         Criterion.STAYS_IN_WORK_AREA: stays_in_work_area(direction_W, P, table, validity.d_push),
+        Criterion.STAYS_ON_TOP: overhang(direction_W, P, table, validity.d_push) <= validity.l_act,
         Criterion.NOT_IN_VAIN: gain > (0.0 if table.doubtful is None else parameters.gain.least),
     }
     tallest = float(table.height.max())
@@ -254,3 +255,16 @@ def stays_in_work_area(
     before = np.count_nonzero(~table.in_work_area(P))
     after = np.count_nonzero(~table.in_work_area(P[None] + distance * direction_W[:, None]), axis=1)
     return after <= before
+
+
+def overhang(
+    direction_W: NDArray, cluster: NDArray[np.bool_], table: TableMap, distance: float
+) -> NDArray[np.float64]:
+    """Share [N] of a cluster on top of others that would come to lie over the table, moved along directions [N, 2].
+
+    What it hides now carries it.
+    """
+    if table.carrying is None:
+        return np.zeros(len(direction_W))
+    moved = table.points(cluster)[None] + distance * direction_W[:, None]
+    return 1.0 - table.lookup(table.carrying, moved).mean(axis=1)

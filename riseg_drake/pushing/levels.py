@@ -66,6 +66,7 @@ def raised(
                         height=np.where(standing, table.height - np.float32(level), np.float32(0)),
                         plane_W=table.plane_W - np.array([0.0, 0.0, 0.0, level]),
                         doubtful=None,
+                        carrying=table.objects,
                     ),
                 )
 
@@ -73,7 +74,7 @@ def raised(
 def _levels(
     thing: NDArray[np.bool_], table: TableMap, minimum_area: float, parameters: LevelsParameters
 ) -> list[float]:
-    """Heights, m, rising, just above what a thing [rows, columns] rises from, along the smallest object's width.
+    """Rising heights, m, just above what a thing [rows, columns] rises from along the smallest object's width.
 
     The lowest comes first: what is pushed near its top tilts, and falls back when it is let go.
     """

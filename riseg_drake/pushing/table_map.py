@@ -52,6 +52,9 @@ class TableMap:
     """[rows, columns], the id of objects that have moved and are not segmented for sure, 0 elsewhere; None
     where nobody tells them from what has never moved."""
 
+    carrying: NDArray[np.bool_] | None = None
+    """[rows, columns], on a map above a level: where there is something below; None where that is the table."""
+
     @cached_property
     def to_object(self) -> NDArray[np.float32]:
         """[rows, columns], how far the nearest object is, m."""

@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from riseg_drake.pushing.find_action import find_action
+from riseg_drake.pushing.clusters import ClustersParameters, find_clusters
+from riseg_drake.pushing.decision import Criterion
+from riseg_drake.pushing.find_action import FindActionParameters, find_action, overhang, valid_pushes
 from riseg_drake.pushing.levels import LevelsParameters, raised
 from riseg_drake.pushing.push import NO_PUSH
 
@@ -100,3 +102,27 @@ def test_another_known_thing_at_that_height_is_in_the_way(drawn):
     push = find_action(drawn.map(), np.random.default_rng(0)).push
     assert push is not NO_PUSH
     assert push.direction_W[0] < 0.9
+
+
+@pytest.mark.parametrize(("way", "share"), [([-1.0, 0.0], 0.0), ([1.0, 0.0], 0.4), ([0.0, 1.0], 0.2)])
+def test_the_overhang_is_what_the_push_takes_beyond_the_edge_of_what_carries(drawn, way, share):
+    # The upper box, 5 cm wide, stands at the right edge and 1 cm from the upper one; it is pushed by 2 cm.
+    drawn.box(0.5, 0.0, 0.12, 0.10, height=0.04, doubtful=1)
+    drawn.box(0.535, 0.015, 0.05, 0.05, height=0.08, doubtful=1)
+    [(upper, above)] = levels(drawn)
+    assert overhang(np.array([way]), upper, above, 0.02) == pytest.approx(share, abs=0.05)
+
+
+def test_on_the_table_nothing_hangs_over(drawn):
+    table = drawn.box(0.5, 0.0, 0.12, 0.10).map()
+    assert overhang(np.array([[1.0, 0.0]]), table.objects, table, 0.02) == 0
+
+
+def test_nothing_is_pushed_off_what_it_lies_on(drawn):
+    drawn.box(0.5, 0.0, 0.07, 0.04, height=0.04, doubtful=1)
+    drawn.box(0.51, 0.0, 0.05, 0.04, height=0.08, doubtful=1)
+    for upper, above in levels(drawn):
+        for each in find_clusters(upper, above, ClustersParameters(), np.random.default_rng(0)):
+            pushes, failed = valid_pushes(each, above, (), None, FindActionParameters())
+            assert all(push.direction_W[0] < -0.7 for push in pushes)
+            assert failed[Criterion.STAYS_ON_TOP].any()
