@@ -260,7 +260,7 @@ def stays_in_work_area(
 def overhang(
     direction_W: NDArray, cluster: NDArray[np.bool_], table: TableMap, distance: float
 ) -> NDArray[np.float64]:
-    """Share [N] of a cluster on top of others that would come to lie over the table, moved along directions [N, 2].
+    """Share [N] of a cluster on top of others that directions [N, 2] would move out over the table.
 
     What it hides now carries it.
     """
