@@ -12,9 +12,20 @@ from numba import njit
 Kernel = TypeVar("Kernel", bound=Callable)
 
 
-def compiled(function: Kernel) -> Kernel:
-    """A function on numbers and arrays, compiled at its first call; other threads run beside it."""
-    try:
-        return njit(function, cache=True, nogil=True)
-    except RuntimeError:  # numba: "no locator available"
-        return njit(function, nogil=True)
+def compiled(signature: str = "") -> Callable[[Kernel], Kernel]:
+    """A function on numbers and arrays, beside which other threads run.
+
+    Compiled for its `signature`, in numba's notation, when it is imported, so that no frame and no robot waits
+    for it; for other types, or without one, when it is first called.
+    """
+
+    def compile_it(function: Kernel) -> Kernel:
+        try:
+            kernel = njit(function, cache=True, nogil=True)
+        except RuntimeError:  # numba: "no locator available"
+            kernel = njit(function, nogil=True)
+        if signature:
+            kernel.compile(signature)
+        return kernel
+
+    return compile_it

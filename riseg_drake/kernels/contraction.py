@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from riseg_drake.kernels.compiled import compiled
 
 
-@compiled
+@compiled("intp[::1](intp, intp[:, ::1], float64[::1], float64[:, ::1], float64)")
 def contract(
     nodes: int,
     edges: NDArray[np.intp],
@@ -22,23 +22,18 @@ def contract(
         nodes: how many.
         edges: [M, 2], pairs of nodes, each once.
         weight: [M], log-odds that both ends are one; renewed in place.
-        cost: [nodes, G], how badly each of G motions explains each node, nats; renewed in place. G may be 0.
+        cost: [nodes, G], how badly each of G motions explains each node, nats; renewed in place.
         free: nats that it may cost two parts to have one motion.
     """
     # Edge e has two ends, 2 e and 2 e + 1; `at` says at which part, and each part has a list of its ends.
     at, after = edges.copy().ravel(), np.full(2 * len(weight), -1)
-    first, degree, size, parent = (
-        np.full(nodes, -1),
-        np.zeros(nodes, np.intp),
-        np.ones(nodes, np.intp),
-        np.arange(nodes),
-    )
-    gone, refused = np.zeros(len(weight), np.bool_), np.zeros(len(weight), np.bool_)
-    beside = np.full(nodes, -1)
-    lowest = np.zeros(nodes)
+    first, degree = np.full(nodes, -1), np.zeros(nodes, np.intp)
+    size, parent = np.ones(nodes, np.intp), np.arange(nodes)
+    # Edges of which one end has grown, or may be asked again once it does.
+    gone, again = np.zeros(len(weight), np.bool_), np.zeros(len(weight), np.bool_)
+    beside, lowest = np.full(nodes, -1), np.zeros(nodes)
     for a in range(nodes):
-        if cost.shape[1]:
-            lowest[a] = cost[a].min()
+        lowest[a] = cost[a].min()
     # What a pair of parts gains: at first its bond, with sizes 0, and what remains of it once its motions were
     # looked at, with the sizes of both: a part whose size is the same is the same part.
     queue = [(0.0, 0, 0, 0, 0, 0)]
@@ -58,17 +53,15 @@ def contract(
         if size_a != size[a] or size_b != size[b]:
             if size_a == 0 and weight[e] != -negative:
                 continue  # their bond has changed
-            lost = -1.0
-            if cost.shape[1]:
-                shared = cost[a, 0] + cost[b, 0]
-                for g in range(1, cost.shape[1]):
-                    shared = min(shared, cost[a, g] + cost[b, g])
-                lost = shared - lowest[a] - lowest[b] - free
+            shared = cost[a, 0] + cost[b, 0]
+            for g in range(1, cost.shape[1]):
+                shared = min(shared, cost[a, g] + cost[b, g])
+            lost = shared - lowest[a] - lowest[b] - free
             if lost > 0:
                 if weight[e] > lost:
                     heappush(queue, (lost - weight[e], a, b, e, size[a], size[b]))
                 else:
-                    refused[e] = True
+                    again[e] = True
                 continue
         if degree[a] < degree[b]:
             a, b = b, a
@@ -76,10 +69,9 @@ def contract(
         size[a] += size[b]
         for g in range(cost.shape[1]):
             cost[a, g] += cost[b, g]
-        if cost.shape[1]:
-            lowest[a] = cost[a].min()
+        lowest[a] = cost[a].min()
         gone[e] = True
-        # The edges of b become those of a, or join those that a has; what had been refused may be asked again.
+        # The edges of b become those of a, or join those that a has.
         end, first[a], degree[a] = first[a], -1, 0
         while end >= 0:
             following = after[end]
@@ -101,16 +93,14 @@ def contract(
                     at[end] = a
                     after[end], first[a] = first[a], end
                     degree[a] += 1
-                refused[end // 2] = False
-                if weight[end // 2] > 0:
-                    heappush(queue, (-weight[end // 2], min(a, c), max(a, c), end // 2, 0, 0))
+                again[end // 2] = True
             end = following
         end = first[a]
         while end >= 0:
             c = at[end ^ 1]
             beside[c] = -1
-            if refused[end // 2]:
-                refused[end // 2] = False
+            if again[end // 2]:
+                again[end // 2] = False
                 if weight[end // 2] > 0:
                     heappush(queue, (-weight[end // 2], min(a, c), max(a, c), end // 2, 0, 0))
             end = after[end]

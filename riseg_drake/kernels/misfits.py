@@ -7,7 +7,10 @@ from riseg_drake.kernels.compiled import compiled
 from riseg_drake.kernels.reading import between, nearest, projected
 
 
-@compiled
+@compiled(
+    "UniTuple(float64[::1], 2)(float32[:, ::1], float32[::1], float32[::1], intp[::1], intp, float32[:, ::1],"
+    "float32[:, ::1], float32[:, ::1], float64, float64, float64, float64, float64, float64)"
+)
 def misfits(
     pixel: NDArray[np.float32],
     gray: NDArray[np.float32],
@@ -69,17 +72,17 @@ def misfits(
             # Against what is right: depth that is not there says neither.
             total[p] += per_depth * (min((z_1 - z) ** 2 / variance, most) - 1)
     # The likeliest factor, by least squares, where the light seems to have changed; it costs once.
-    factor, of_factor = np.ones(count), np.zeros(count)
+    factor, of_factor = np.ones(count), np.full(count, np.inf)
     for p in range(count):
         if of_gray[p] > 0.5 * known[p]:
             factor[p] = (before_after[p] + certainty) / (before_before[p] + certainty)
             of_factor[p] = certainty * (factor[p] - 1) ** 2
     for n in range(len(gray)):
         p = owner[n]
-        if factor[p] != 1 and not np.isnan(after[n]):
+        if of_factor[p] < np.inf and not np.isnan(after[n]):
             # With it the noise of the first image is amplified.
             noise = max(factor[p], 1.0) ** 2
             of_factor[p] += min(per_variance[n] * (after[n] - factor[p] * gray[n]) ** 2 / noise, most)
     for p in range(count):
-        total[p] += min(of_gray[p], of_factor[p]) if factor[p] != 1 else of_gray[p]
+        total[p] += min(of_gray[p], of_factor[p])
     return total, lost

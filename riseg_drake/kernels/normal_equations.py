@@ -7,7 +7,11 @@ from riseg_drake.kernels.compiled import compiled
 from riseg_drake.kernels.reading import between, nearest, projected
 
 
-@compiled
+@compiled(
+    "Tuple((float64[:, ::1], float64[::1]))(float32[:, ::1], float64[:, ::1], float32[::1], float32[::1],"
+    "float32[::1], float32[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], UniTuple(float64, 2),"
+    "float32[:, ::1], float32[:, ::1], float64, float64)"
+)
 def normal_equations(
     pixel: NDArray[np.float32],
     p_C0Q: NDArray[np.float64],

@@ -10,7 +10,7 @@ from riseg_drake.kernels.compiled import compiled
 Real = float | np.floating[Any]
 
 
-@compiled
+@compiled()
 def between(image: NDArray[np.float32], u: Real, v: Real) -> Real:
     """The value of an image [H, W] at a place, bilinear; NaN beyond its edges and beside any NaN."""
     if not (u >= 0 and v >= 0 and u < image.shape[1] - 1 and v < image.shape[0] - 1):
@@ -22,7 +22,7 @@ def between(image: NDArray[np.float32], u: Real, v: Real) -> Real:
     return above + t * (below - above)
 
 
-@compiled
+@compiled()
 def nearest(image: NDArray[np.float32], u: Real, v: Real) -> Real:
     """The value of the pixel of an image [H, W] that is nearest to a place; 0 beyond its edges."""
     if not (u >= -0.5 and v >= -0.5 and u < image.shape[1] - 0.5 and v < image.shape[0] - 0.5):
@@ -30,7 +30,7 @@ def nearest(image: NDArray[np.float32], u: Real, v: Real) -> Real:
     return image[int(v + 0.5), int(u + 0.5)]
 
 
-@compiled
+@compiled()
 def projected(M: NDArray[np.float32], pixel: NDArray[np.float32], n: int) -> tuple[Real, Real, Real]:
     """Where pixel n of `pixel` [4, N], (u, v, 1, 1 / z), is in another view by M [3, 4], `pixel_projection`:
     u, v, and by what factor its depth has grown; NaN for a point that is not ahead."""

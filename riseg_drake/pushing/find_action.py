@@ -21,7 +21,7 @@ from riseg_drake.pushing.push_path import PushPath
 from riseg_drake.pushing.pusher import Pusher
 from riseg_drake.pushing.table_map import TableMap, TableMapParameters
 from riseg_drake.pushing.tried_pushes import TriedPush, times_pushed
-from riseg_drake.pushing.validity import ValidityParameters, is_valid_push
+from riseg_drake.pushing.validity import ValidityParameters, is_valid_push, share_after_push
 
 ALIKE_DISTANCE = 0.010
 """Where the arm has no path for a push, it is not asked about another that begins this close to it, m ..."""
@@ -266,5 +266,4 @@ def overhang(
     """
     if table.carrying is None:
         return np.zeros(len(direction_W))
-    moved = table.points(cluster)[None] + distance * direction_W[:, None]
-    return 1.0 - table.lookup(table.carrying, moved).mean(axis=1)
+    return 1.0 - share_after_push(table.carrying, direction_W, cluster, table, distance)

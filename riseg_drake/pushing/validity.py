@@ -96,12 +96,25 @@ def overlap_after_push(
 
     For directions bc [N, 2] and P as cells [rows, columns], moved by `distance`, m.
     """
-    others = table.objects & ~cluster
+    return share_after_push(table.objects & ~cluster, direction_W, cluster, table, distance)
+
+
+def share_after_push(
+    cells: NDArray[np.bool_],
+    direction_W: NDArray,
+    cluster: NDArray[np.bool_],
+    table: TableMap,
+    distance: float,
+) -> NDArray[np.float64]:
+    """Share [N] of a cluster that lies on some cells [rows, columns] once moved by `distance`, m.
+
+    Along directions [N, 2].
+    """
     P = table.points(cluster)
     if len(P) > 1500:  # a share needs no more points than that
         P = P[:: len(P) // 1500 + 1]
     moved = P[None] + distance * direction_W[:, None]
-    return table.lookup(others, moved).mean(axis=1)
+    return table.lookup(cells, moved).mean(axis=1)
 
 
 def rectangle(p_W: NDArray, direction_W: NDArray, along: NDArray, across: NDArray) -> NDArray[np.float64]:

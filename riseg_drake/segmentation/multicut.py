@@ -25,14 +25,8 @@ def multicut(
     """
     pair = np.sort(edges, axis=1) @ [nodes, 1]
     each, which = np.unique(pair, return_inverse=True)
-    cost = np.zeros((nodes, 0)) if nats is None or len(nats) < 2 else np.array(nats.T, np.float64, order="C")
+    cost = np.zeros((nodes, 1)) if nats is None or len(nats) < 2 else np.array(nats.T, np.float64, order="C")
     once = np.stack(np.divmod(each, nodes), axis=1)
     bond = np.asarray(np.bincount(which, weight, len(each)), np.float64)
     stands_for = contract(nodes, once, bond, cost, free)
     return np.unique(stands_for, return_inverse=True)[1]
-
-
-def loss(cost_a: NDArray[np.float64], cost_b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What it costs pairs of parts to have one motion, nats [...], by how badly each explains each [G, ...]."""
-    shared: NDArray[np.float64] = (cost_a + cost_b).min(0) - cost_a.min(0) - cost_b.min(0)
-    return shared

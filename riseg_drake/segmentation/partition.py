@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.segmentation.keyframe import Keyframe
-from riseg_drake.segmentation.multicut import loss, multicut
+from riseg_drake.segmentation.multicut import multicut
 from riseg_drake.segmentation.potts import PottsGraph, potts_labels
 
 _NEVER = 1e3
@@ -109,7 +109,9 @@ def apart(
     """[M], log-odds of each border that speak against it since its two parts [N] have no one motion."""
     a, b = part[keyframe.borders].T
     cost = _nats_of_parts(part, nats)
-    lost = loss(cost[:, a], cost[:, b]) - parameters.rigid_min
+    # What it costs both parts to have one motion.
+    shared = (cost[:, a] + cost[:, b]).min(0) - cost[:, a].min(0) - cost[:, b].min(0)
+    lost = shared - parameters.rigid_min
     pair = np.minimum(a, b) * cost.shape[1] + np.maximum(a, b)
     _, inverse = np.unique(pair, return_inverse=True)
     length = np.bincount(inverse, keyframe.length)[inverse]

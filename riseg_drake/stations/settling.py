@@ -7,8 +7,9 @@ import numpy as np
 from pydrake.geometry import Box
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction
+from pydrake.multibody.tree import RigidBody
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import Context, DiagramBuilder
 
 from riseg_drake.stations.contact import let_touch, set_contact_model
 from riseg_drake.stations.object_models import ObjectModel
@@ -39,6 +40,15 @@ SCATTER = 0.028
 
 TABLE = 0
 """Stands for the table among object ids."""
+
+
+def are_slower(bodies: Sequence[RigidBody], context: Context, limits: tuple[float, float]) -> bool:
+    """Whether all bodies of a plant are slower than some m/s and rad/s."""
+    velocities = [body.EvalSpatialVelocityInWorld(context) for body in bodies]
+    return all(
+        np.linalg.norm(V.translational()) < limits[0] and np.linalg.norm(V.rotational()) < limits[1]
+        for V in velocities
+    )
 
 
 class SettlingTable:
@@ -83,7 +93,7 @@ class SettlingTable:
         start = self._simulator.get_context().get_time()
         for time in np.arange(0.2, longest, 0.1):
             advance(self._simulator, start + time)
-            if self._are_slower(*STILL):
+            if are_slower(self._bodies, self._context, STILL):
                 return True
         return False
 
@@ -92,17 +102,9 @@ class SettlingTable:
         start = self._simulator.get_context().get_time()
         for time in np.arange(0.2, seconds + 0.05, 0.1):
             advance(self._simulator, start + time)
-            if not self._are_slower(*TREMBLING):
+            if not are_slower(self._bodies, self._context, TREMBLING):
                 return False
         return True
-
-    def _are_slower(self, speed: float, turning: float) -> bool:
-        """Whether all objects are slower than some m/s and rad/s."""
-        velocities = [body.EvalSpatialVelocityInWorld(self._context) for body in self._bodies]
-        return all(
-            np.linalg.norm(V.translational()) < speed and np.linalg.norm(V.rotational()) < turning
-            for V in velocities
-        )
 
     def objects(self) -> list[PlacedObject]:
         """The objects where they are now."""

@@ -23,7 +23,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, ModelInstanceIndex, RigidBody
 from pydrake.systems.framework import Context
 
-from riseg_drake.stations.settling import STILL
+from riseg_drake.stations.settling import STILL, are_slower
 
 ROOM = 0.003
 """m to the robot within which a body is awake, ..."""
@@ -76,13 +76,13 @@ class Sleep:
     def look(self, root: Context) -> None:
         """Once a period: wake the bodies, or let them sleep. `root` is the simulation's own context."""
         context = self._plant.GetMyMutableContextFromRoot(root)
-        near = self._robot_is_near(context)
-        if self._filter is not None and near:
-            for joint in self._joints:
-                joint.Unlock(context)
-            self._filters(root).RemoveDeclaration(self._filter)
-            self._filter = None
-        elif self._filter is None and not near and self._are_still(context):
+        if self._filter is not None:
+            if self._robot_is_near(context):
+                for joint in self._joints:
+                    joint.Unlock(context)
+                self._filters(root).RemoveDeclaration(self._filter)
+                self._filter = None
+        elif are_slower(self._bodies, context, STILL) and not self._robot_is_near(context):
             for joint in self._joints:
                 joint.Lock(context)
             robot = {shape for _, shape in self._robot}
@@ -93,13 +93,6 @@ class Sleep:
 
     def _filters(self, root: Context) -> CollisionFilterManager:
         return self._scene_graph.collision_filter_manager(self._scene_graph.GetMyMutableContextFromRoot(root))
-
-    def _are_still(self, context: Context) -> bool:
-        velocities = [body.EvalSpatialVelocityInWorld(context) for body in self._bodies]
-        return all(
-            np.linalg.norm(V.translational()) < STILL[0] and np.linalg.norm(V.rotational()) < STILL[1]
-            for V in velocities
-        )
 
     def _robot_is_near(self, context: Context) -> bool:
         """Whether the robot may touch a body before the next look."""

@@ -119,10 +119,14 @@ def test_on_the_table_nothing_hangs_over(drawn):
 
 
 def test_nothing_is_pushed_off_what_it_lies_on(drawn):
-    drawn.box(0.5, 0.0, 0.07, 0.04, height=0.04, doubtful=1)
-    drawn.box(0.51, 0.0, 0.05, 0.04, height=0.08, doubtful=1)
+    drawn.box(0.5, 0.0, 0.09, 0.05, height=0.04, doubtful=1)
+    drawn.box(0.52, 0.0, 0.05, 0.05, height=0.08, doubtful=1)
+    found = []
     for upper, above in levels(drawn):
         for each in find_clusters(upper, above, ClustersParameters(), np.random.default_rng(0)):
             pushes, failed = valid_pushes(each, above, (), None, FindActionParameters())
-            assert all(push.direction_W[0] < -0.7 for push in pushes)
             assert failed[Criterion.STAYS_ON_TOP].any()
+            found += pushes
+    # Of its 5 cm, 30 % may hang over: of a push by 2 cm 1.5 cm to a side, none of it the way it stands at the edge.
+    assert found
+    assert all(abs(push.direction_W[1]) <= 0.75 + 0.1 and push.direction_W[0] < 0 for push in found)
