@@ -127,6 +127,6 @@ def test_nothing_is_pushed_off_what_it_lies_on(drawn):
             pushes, failed = valid_pushes(each, above, (), None, FindActionParameters())
             assert failed[Criterion.STAYS_ON_TOP].any()
             found += pushes
-    # Of its 5 cm, 30 % may hang over: of a push by 2 cm 1.5 cm to a side, none of it the way it stands at the edge.
+    # Of its 5 cm, 30 % may hang over: of a push by 2 cm 1.5 cm to a side, and nothing at the near edge.
     assert found
     assert all(abs(push.direction_W[1]) <= 0.75 + 0.1 and push.direction_W[0] < 0 for push in found)
