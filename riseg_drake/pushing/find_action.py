@@ -201,6 +201,7 @@ def valid_pushes_of(
         boundary_W, direction_W, pushed, table, pusher, validity, target=None if alone else P
     )
     is_valid = is_valid_push(contacts.b_W, direction_W, center_W, P, table, pusher, validity)
+    in_doubt = table.doubtful is not None or table.carrying is not None
     thing = P if table.doubtful is None else table.doubtful == table.doubtful[P][0]
     gain = expected_gain(
         contacts, direction_W, is_valid.overlap, P, table,
@@ -214,7 +215,7 @@ def valid_pushes_of(
         Criterion.ONLY_TARGET: contacts.only_target & (contacts.transmitted > 0),
         Criterion.STAYS_IN_WORK_AREA: stays_in_work_area(direction_W, P, table, validity.d_push),
         Criterion.STAYS_ON_TOP: overhang(direction_W, P, table, validity.d_push) <= validity.l_act,
-        Criterion.NOT_IN_VAIN: gain > (0.0 if table.doubtful is None else parameters.gain.least),
+        Criterion.NOT_IN_VAIN: gain > (parameters.gain.least if in_doubt else 0.0),
     }
     tallest = float(table.height.max())
     cluster_W = table.points(P)

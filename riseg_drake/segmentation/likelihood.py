@@ -41,7 +41,7 @@ class LikelihoodParameters:
     that is smoothed over 1.5 pixels (docs/sensing.md)."""
     chance: float = 1.5
     """Times the mean squared residual that is usual, up to which a superpixel's may be by chance."""
-    view_error: float = 0.01
+    view_error: float = 0.005
     """The least that is thought of the view's error, see `Comparison`."""
     view_errors: float = 5.0
     """So many times that depth may err, and what stands still may seem to have moved, at most: real errors have
@@ -61,21 +61,27 @@ class Costs:
     """[G, N], mean squared residuals of each superpixel's witnesses: 2 where a motion is right, 18 at most."""
     witnesses: NDArray[np.float64]
     """[N], how many witnesses each superpixel has."""
-    hidden: NDArray[np.float64]
-    """[G, N], share of them that cannot be compared, as a motion takes them behind the robot or out of the
-    image; those that the camera's own motion takes out of it are not counted."""
+    lost: NDArray[np.float64]
+    """[G, N], share of them that cannot be compared, as they are behind the robot or something else, or out of
+    the image."""
+    leaves: NDArray[np.float64]
+    """[N], share of them that the camera's own motion takes out of the image."""
 
     def with_motion(self, other: "Costs") -> "Costs":
         """These and other motions, for the same superpixels."""
-        misfit, hidden = np.vstack([self.misfit, other.misfit]), np.vstack([self.hidden, other.hidden])
-        return Costs(misfit, self.witnesses, hidden)
+        misfit, lost = np.vstack([self.misfit, other.misfit]), np.vstack([self.lost, other.lost])
+        return Costs(misfit, self.witnesses, lost, self.leaves)
+
+    @property
+    def hidden(self) -> NDArray[np.float64]:
+        """[G, N], share of witnesses that a motion takes where they cannot be compared."""
+        return np.maximum(self.lost - self.leaves, 0)
 
     def excess(self, parameters: LikelihoodParameters) -> NDArray[np.float64]:
         """[G, N], how much worse each motion is than one that is right would be, nats, bounded."""
-        level, scale = self._noise(parameters)
-        return np.minimum(
-            np.maximum(self.misfit - parameters.chance * level, 0) * scale, parameters.superpixel_max
-        )
+        misfit, level, scale = self._by_noise(parameters)
+        excess = np.maximum(misfit - parameters.chance * level, 0)
+        return np.minimum(excess * scale, parameters.superpixel_max)
 
     def nats(self, parameters: LikelihoodParameters) -> NDArray[np.float64]:
         """[G, N], how much worse than the best each motion is, by the noise that is there, bounded.
@@ -83,16 +89,20 @@ class Costs:
         A residual within the noise says no more than that: what is better by chance is no better. So a blank
         surface, which any motion along itself explains, speaks for none of them.
         """
-        level, scale = self._noise(parameters)
-        misfit = np.maximum(self.misfit, parameters.chance * level) + parameters.hidden * level * self.hidden
+        misfit, level, scale = self._by_noise(parameters)
+        misfit = np.maximum(misfit, parameters.chance * level) + parameters.hidden * level * self.hidden
         return np.minimum((misfit - misfit.min(0)) * scale, parameters.superpixel_max)
 
-    def _noise(self, parameters: LikelihoodParameters) -> tuple[float, NDArray[np.float64]]:
-        """The mean squared residual that is usual where a motion is right, and nats [N] for each more."""
-        asked = self.witnesses > parameters.correlated_gray
+    def _by_noise(
+        self, parameters: LikelihoodParameters
+    ) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
+        """Mean squared residuals [G, N], what cannot be compared at that which is usual where a motion is
+        right, the latter, and nats [N] for each more."""
+        asked = self.witnesses * (1 - self.lost.min(0)) > parameters.correlated_gray
         level = float(np.median(self.misfit.min(0)[asked])) if asked.any() else EXPECTED
         dispersion = max(1.0, level / EXPECTED)
-        return level, self.witnesses / (2 * parameters.correlated_gray * dispersion)
+        scale = self.witnesses / (2 * parameters.correlated_gray * dispersion)
+        return self.misfit + self.lost * (level - EXPECTED), level, scale
 
 
 def motion_costs(
@@ -108,15 +118,15 @@ def motion_costs(
     seen = parameters.view_errors * compared.shift > _SEEN
     depth_factors = 1 + errs * np.array([0.0, -1.0, -0.5, 0.5, 1.0]) if seen else np.ones(1)
     seen_otherwise = parameters.light_view * compared.another_view
-    misfit, hidden = np.empty((2, len(motions_K), keyframe.count))
+    misfit, lost = np.empty((2, len(motions_K), keyframe.count))
     for k, motion in enumerate(motions_K):
         still = np.array_equal(motion, np.eye(4))
         light = np.hypot(parameters.light_still if still else parameters.light, seen_otherwise)
         factors = depth_factors if still else np.ones(1)
         tries = [_misfit(compared, motion, factor, float(light), parameters) for factor in factors]
         misfit[k] = np.min([each for each, _ in tries], axis=0)
-        hidden[k] = np.maximum(tries[0][1] - compared.leaves, 0)
-    return Costs(misfit, keyframe.witness_count.astype(float), hidden)
+        lost[k] = tries[0][1]
+    return Costs(misfit, keyframe.witness_count.astype(float), lost, compared.leaves)
 
 
 def _misfit(
@@ -145,6 +155,7 @@ def _misfit(
         frame.unhidden_depth,
         float(np.sqrt(2)) * compared.depth_noise,
         compared.depth_error,
+        parameters.view_errors * compared.shift > _SEEN,  # then what is hollow hides its inside
         parameters.correlated_gray / light**2,
         parameters.correlated_gray / parameters.correlated_depth,
         parameters.residual_max,

@@ -53,8 +53,12 @@ def _along(label: NDArray[np.intp], height: NDArray[np.float32], level: float) -
         elif h_1 > h_0 + _STEP:
             waiting.append((a, h_0))
         elif h_1 < h_0 - _STEP:
-            while waiting and waiting[-1][1] > h_1 + level:
-                waiting.pop()
-            if waiting and waiting[-1][1] > h_1 - level:
-                found.append((waiting.pop()[0], b))
+            lower = []
+            while waiting and waiting[-1][1] > h_1 - level:
+                behind, h = waiting.pop()
+                if h < h_1 + level:
+                    found.append((behind, b))
+                if h < h_1 - _STEP:  # what is higher may be in front of it, too
+                    lower.append((behind, h))
+            waiting += reversed(lower)
     return found

@@ -8,6 +8,7 @@ import pytest
 from riseg_drake.pushing.clusters import ClustersParameters, find_clusters
 from riseg_drake.pushing.decision import Criterion
 from riseg_drake.pushing.find_action import FindActionParameters, find_action, overhang, valid_pushes
+from riseg_drake.pushing.gain import GainParameters
 from riseg_drake.pushing.levels import LevelsParameters, raised
 from riseg_drake.pushing.push import NO_PUSH
 
@@ -130,3 +131,14 @@ def test_nothing_is_pushed_off_what_it_lies_on(drawn):
     # Of its 5 cm, 30 % may hang over: of a push by 2 cm 1.5 cm to a side, and nothing at the near edge.
     assert found
     assert all(abs(push.direction_W[1]) <= 0.75 + 0.1 and push.direction_W[0] < 0 for push in found)
+
+
+def test_what_lies_on_another_is_left_alone_where_too_little_is_to_be_expected(drawn):
+    # With no more to expect above the lower box than `least`, one of its own sides is pushed.
+    table = stack(drawn).map()
+    push = find_action(table, np.random.default_rng(0)).push
+    assert push.p_WE[2] > 0.044
+    for least, above in ((0.9 * (1 - push.cost), True), (1.1 * (1 - push.cost), False)):
+        parameters = FindActionParameters(gain=GainParameters(least=least))
+        decision = find_action(table, np.random.default_rng(0), parameters)
+        assert (decision.push.p_WE[2] > 0.044) == above

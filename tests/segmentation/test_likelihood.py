@@ -87,27 +87,52 @@ def test_a_camera_that_stands_shows_nothing_of_how_depth_errs(plate: tuple[Keyfr
 def test_nats_are_squared_residuals_by_what_is_usual_and_no_more_than_a_superpixel_may_say() -> None:
     # 12 witnesses count as 4, half of each squared residual; what is usual is 2, up to 3 may be by chance.
     misfit, witnesses = np.array([[2.0, 2.0, 3.5], [2.5, 4.0, 2.0]]), np.array([12.0, 12.0, 12.0])
-    seen = np.zeros((2, 3))
-    nats = Costs(misfit, witnesses, seen).nats(LikelihoodParameters())
+    seen = np.zeros((2, 3)), np.zeros(3)
+    nats = Costs(misfit, witnesses, *seen).nats(LikelihoodParameters())
     np.testing.assert_allclose(nats, [[0, 0, 0.5 * 2], [0, 1.0 * 2, 0]])
-    twice = Costs(misfit, 100 * witnesses, seen).nats(LikelihoodParameters())
+    twice = Costs(misfit, 100 * witnesses, *seen).nats(LikelihoodParameters())
     np.testing.assert_allclose(twice, [[0, 0, 4], [0, 4, 0]])
 
 
 def test_excess_is_what_no_motion_explains_beyond_what_may_be_by_chance() -> None:
     # As above, but against a motion that is right; the third is explained by neither, the fourth says too much.
     misfit, witnesses = np.array([[2.0, 2.0, 5.0, 18.0], [2.5, 4.0, 4.0, 2.0]]), np.full(4, 12.0)
-    excess = Costs(misfit, witnesses, np.zeros((2, 4))).excess(LikelihoodParameters())
+    excess = Costs(misfit, witnesses, np.zeros((2, 4)), np.zeros(4)).excess(LikelihoodParameters())
     np.testing.assert_allclose(excess, [[0, 0, 2.0 * 2, 4], [0, 1.0 * 2, 1.0 * 2, 0]])
 
 
 def test_what_a_motion_hides_is_no_match_but_worse_by_what_is_usual() -> None:
     # The second motion hides half of it. What is usual is 2: half of that, for 12 witnesses that count as 4.
     misfit, witnesses = np.array([[2.5], [2.0]]), np.array([12.0])
-    nats = Costs(misfit, witnesses, np.array([[0.0], [0.5]])).nats(LikelihoodParameters())
+    nats = Costs(misfit, witnesses, np.array([[0.0], [0.5]]), np.zeros(1)).nats(LikelihoodParameters())
     np.testing.assert_allclose(nats, [[0], [0.5 * 2 * 12 / 3 / 2]])
-    without = Costs(misfit, witnesses, np.array([[0.0], [0.5]])).nats(LikelihoodParameters(hidden=0.0))
+    without = Costs(misfit, witnesses, np.array([[0.0], [0.5]]), np.zeros(1)).nats(
+        LikelihoodParameters(hidden=0.0)
+    )
     np.testing.assert_array_equal(without, [[0], [0]])
+
+
+def test_what_cannot_be_compared_is_missed_by_no_motion_however_little_noise_there_is() -> None:
+    # Three superpixels match with 1.0 where 2 was thought usual; the fourth left the view and counts as 2.
+    misfit, witnesses = np.array([[1.0, 1.0, 1.0, 2.0]]), np.full(4, 12.0)
+    lost = np.array([[0.0, 0.0, 0.0, 1.0]])
+    np.testing.assert_array_equal(Costs(misfit, witnesses, lost, lost[0]).excess(LikelihoodParameters()), 0)
+    # Half of it in view, and that wrong: 0.5 x 2 + 0.5 x 9, where 0.5 x 1 + 0.5 x 9 is meant.
+    misfit[0, 3], lost[0, 3] = 5.5, 0.5
+    excess = Costs(misfit, witnesses, lost, lost[0]).excess(LikelihoodParameters(superpixel_max=99.0))
+    np.testing.assert_allclose(excess[0], [0, 0, 0, (5.0 - 1.5) * 12 / 3 / 2])
+
+
+def test_what_hides_itself_from_another_view_is_not_compared_and_from_the_same_view_it_is(
+    plate: tuple[Keyframe, Frame],
+) -> None:
+    keyframe, frame = plate
+    covered = replace(frame, depth=frame.depth * np.float32(0.8))
+    for another, lost in ((0.0, 0), (1.0, 1)):
+        compared = Comparison(keyframe, covered, DEPTH_NOISE, view_error=0.01)
+        vars(compared)["another_view"] = another
+        costs = motion_costs(compared, STILL, LikelihoodParameters())
+        np.testing.assert_array_equal(costs.lost[0][costs.witnesses > 0], lost)
 
 
 def test_what_is_behind_the_robot_or_outside_the_image_is_hidden(plate: tuple[Keyframe, Frame]) -> None:

@@ -165,6 +165,15 @@ def test_in_motion_nothing_is_found_where_nothing_moves_or_by_less_than_a_step(a
     assert len(Moved(after).search(search=missing_motion)) == 0
 
 
+@pytest.mark.renders
+def test_in_motion_what_has_moved_by_less_than_a_step_keeps_nothing_else_from_being_found():
+    # A print 3 mm out of place is missed more than a blank box that has gone 17 mm, and is asked first.
+    moved = Moved({0: (-0.085, 0.008, 0.0), 2: (0.0575, 0.011, 0.0)}, BLANK)
+    found = moved.search(search=missing_motion)
+    assert len(found) == 1
+    assert moved.error(0, found) < 2
+
+
 def test_the_one_motion_of_a_part_falls_short_of_the_best_of_each_superpixel():
     # Part 0: 3 by the first motion, 5 by the second. Part 1: nothing is missing by the second.
     nats = np.array([[0.0, 3.0, 4.0], [5.0, 0.0, 0.0]])

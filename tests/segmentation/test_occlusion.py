@@ -30,6 +30,9 @@ def strips(heights: list[float], rows: int = 20) -> tuple[np.ndarray, np.ndarray
         ([0.02, 0.04, 0.06, 0.04, 0.02], [[0, 4], [1, 3]]),
         ([0.02, 0.04, 0.06, 0.02], [[0, 3]]),  # what is at 0.04 ends behind
         ([0.02, 0.05, 0.02, 0.05, 0.02], [[0, 2], [2, 4]]),
+        ([0.02, 0.05, 0.03, 0.05, 0.02], [[0, 2], [0, 4], [2, 4]]),  # or what is between is in front, too
+        ([0.03, 0.05, 0.02, 0.05, 0.03], [[0, 2], [2, 4]]),  # which what is lower cannot be
+        ([0.02, 0.03, 0.05, 0.025], [[0, 3], [1, 3]]),
     ],
 )
 def test_what_is_as_high_on_both_sides_of_what_is_in_front_may_be_one(
