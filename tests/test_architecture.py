@@ -65,6 +65,21 @@ def test_the_table_says_what_each_room_imports():
     assert {row[0].strip("`"): words(row[1]) for row in rows} == {name: real[name] for name in FLOORS}
 
 
+def test_the_table_says_what_each_room_of_app_imports_and_only_the_command_line_knows_them_all():
+    app = PACKAGE / "app"
+    rooms = {path.parent.name for path in app.glob("*/*.py")}
+    real = {name: set() for name in rooms}
+    beside = set()
+    for path in sorted(app.rglob("*.py")):
+        for module in imports(path):
+            other = module.removeprefix("riseg_drake.app.").split(".")[0]
+            if module.startswith("riseg_drake.app.") and other in rooms and other != path.parent.name:
+                beside.add(path.stem) if path.parent == app else real[path.parent.name].add(other)
+    rows = table_rows(section(PAGE, "The rooms of app"))
+    assert {row[0].strip("`"): words(row[1]) for row in rows} == real
+    assert beside <= {"cli", "commands", "arguments"}
+
+
 def test_the_table_says_who_hears_whom_in_the_diagram():
     wired = make_diagram(load_scenario(None, HARDWARE), seed=0).diagram
     real = defaultdict(set)

@@ -65,14 +65,14 @@ def _refused(error: Exception) -> int:
 
 def _mistakes() -> tuple[type[Exception], ...]:
     """The errors that tell a person what to do otherwise; any other is a fault of this program."""
-    from riseg_drake.app.arm_travel import TravelError
     from riseg_drake.app.emulate import CameraDiedError
-    from riseg_drake.app.evaluate import EvaluationError
+    from riseg_drake.app.evaluate.command import EvaluationError
+    from riseg_drake.app.evaluate.scene_pool import PoolError
     from riseg_drake.app.graphics import NoGraphicsError
-    from riseg_drake.app.hardware import HardwareError
+    from riseg_drake.app.hardware.arm_travel import TravelError
+    from riseg_drake.app.hardware.command import HardwareError
     from riseg_drake.app.output_folder import OutputError
     from riseg_drake.app.scenario_file import ScenarioError
-    from riseg_drake.app.scene_pool import PoolError
     from riseg_drake.app.work_state import RunStoppedError
     from riseg_drake.evaluation.label_folders import LabelFolderError
     from riseg_drake.evaluation.true_things import ThingsError

@@ -11,7 +11,7 @@ from rich.console import Console
 
 def run(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg run`."""
-    from riseg_drake.app.run import run_command
+    from riseg_drake.app.run.command import run_command
 
     run_command(
         chosen.scenario, chosen.seed, chosen.output, chosen.record, chosen.meshcat, chosen.overwrite, console
@@ -20,20 +20,20 @@ def run(chosen: argparse.Namespace, console: Console) -> None:
 
 def evaluate(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg evaluate`. Raises EvaluationError for options that do not go together."""
-    from riseg_drake.app.evaluate import EvaluationError
+    from riseg_drake.app.evaluate.command import EvaluationError
 
     kind, others = _evaluation_of(chosen.suite)
     for name in others:
         if getattr(chosen, name):
             raise EvaluationError(f"--{name} does not go with {kind}; see riseg evaluate --help")
     if chosen.suite == "films":
-        from riseg_drake.app.films import films_command
+        from riseg_drake.app.evaluate.films import films_command
 
         return films_command(
             chosen.seed, chosen.recordings, chosen.output, chosen.scenario, chosen.overwrite, console
         )
     if chosen.suite is not None:
-        from riseg_drake.app.suite import suite_command
+        from riseg_drake.app.evaluate.suite import suite_command
 
         return suite_command(
             chosen.suite,
@@ -45,7 +45,7 @@ def evaluate(chosen: argparse.Namespace, console: Console) -> None:
             chosen.overwrite,
             console,
         )
-    from riseg_drake.app.evaluate import evaluate_command
+    from riseg_drake.app.evaluate.command import evaluate_command
 
     evaluate_command(
         chosen.scenes or 20,
@@ -77,7 +77,7 @@ def hardware(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg hardware`."""
     # Threads that wait for each other busily take the processor from the drivers and from the commands.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    from riseg_drake.app.hardware import hardware_command
+    from riseg_drake.app.hardware.command import hardware_command
 
     hardware_command(
         chosen.scenario,
@@ -96,7 +96,7 @@ def hardware(chosen: argparse.Namespace, console: Console) -> None:
 def hand_eye(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg hand-eye`."""
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    from riseg_drake.app.hand_eye import hand_eye_command
+    from riseg_drake.app.hardware.hand_eye import hand_eye_command
 
     hand_eye_command(chosen.scenario, chosen.output, chosen.yes, chosen.overwrite, console)
 
@@ -112,7 +112,7 @@ def emulate(chosen: argparse.Namespace, console: Console) -> None:
 
 def segment(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg segment`."""
-    from riseg_drake.app.segment_command import SegmentRequest, segment_command
+    from riseg_drake.app.segment.command import SegmentRequest, segment_command
 
     segment_command(
         SegmentRequest(
@@ -132,7 +132,7 @@ def segment(chosen: argparse.Namespace, console: Console) -> None:
 
 def score(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg score`."""
-    from riseg_drake.app.score_command import score_command
+    from riseg_drake.app.evaluate.score import score_command
 
     score_command(chosen.predicted, chosen.true, chosen.json, console)
 
@@ -140,27 +140,27 @@ def score(chosen: argparse.Namespace, console: Console) -> None:
 def bench(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg bench`."""
     if chosen.raft:
-        from riseg_drake.app.raft_bench import raft_bench_command
+        from riseg_drake.app.bench.raft import raft_bench_command
 
         return raft_bench_command(chosen.scenario, console)
     if chosen.stops:
-        from riseg_drake.app.stop_bench import bench_stops
+        from riseg_drake.app.bench.stop import bench_stops
 
         return bench_stops(console)
-    from riseg_drake.app.bench import bench_command
+    from riseg_drake.app.bench.command import bench_command
 
     bench_command(chosen.scenario, chosen.seed, chosen.stream, chosen.sam, console)
 
 
 def diagram(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg diagram`."""
-    from riseg_drake.app.drawing import diagram_command
+    from riseg_drake.app.show.drawing import diagram_command
 
     diagram_command(chosen.scenario, chosen.output, console)
 
 
 def pictures(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg pictures`."""
-    from riseg_drake.app.pictures_command import pictures_command
+    from riseg_drake.app.show.command import pictures_command
 
     pictures_command(chosen.scenario, chosen.seed, chosen.output, chosen.evaluation, chosen.overwrite, console)

@@ -5,11 +5,18 @@ import cv2
 import numpy as np
 import pytest
 
-from riseg_drake.app import ablation
-from riseg_drake.app.ablation import AS_IN_THE_PAPER, LITERAL, LITERAL_STEPS, ablate, switched, versions
 from riseg_drake.app.cli import main
-from riseg_drake.app.replay import Replay
+from riseg_drake.app.evaluate import ablation
+from riseg_drake.app.evaluate.ablation import (
+    AS_IN_THE_PAPER,
+    LITERAL,
+    LITERAL_STEPS,
+    ablate,
+    switched,
+    versions,
+)
 from riseg_drake.app.scenario import Scenario, load_scenario
+from riseg_drake.app.segment.replay import Replay
 from riseg_drake.app.segmentation_block import panda_view
 from riseg_drake.recording.layout import RecordingError
 from riseg_drake.recording.reader import RecordingReader

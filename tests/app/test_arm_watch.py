@@ -2,10 +2,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from riseg_drake.app import arm_watch
-from riseg_drake.app.arm_travel import TravelError
-from riseg_drake.app.arm_watch import CONTACT_MARGIN, ArmWatch
-from riseg_drake.app.interactions import Progress
+from riseg_drake.app.hardware import arm_watch
+from riseg_drake.app.hardware.arm_travel import TravelError
+from riseg_drake.app.hardware.arm_watch import CONTACT_MARGIN, ArmWatch
+from riseg_drake.app.run.interactions import Progress
 from riseg_drake.pushing.push import NO_PUSH, ArmPhase
 from riseg_drake.robot.supervisor import Cause, Mode, SafetyState
 

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from riseg_drake.app.depth_figures import DISPARITY, depth_figures, depth_table, draw_depth
+from riseg_drake.app.evaluate.depth_figures import DISPARITY, depth_figures, depth_table, draw_depth
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.host.images import read_image
 from riseg_drake.recording.layout import RecordedFrame

@@ -7,8 +7,8 @@ from pydrake.systems.primitives import ConstantVectorSource
 
 from riseg_drake.app.cli import main
 from riseg_drake.app.diagram import make_diagram
-from riseg_drake.app.drawing import MEMORY_COLOR, STAGE_COLOR, UNUSED_COLOR, draw
 from riseg_drake.app.scenario import load_scenario
+from riseg_drake.app.show.drawing import MEMORY_COLOR, STAGE_COLOR, UNUSED_COLOR, draw
 
 STAGES = ("ExpectedFlow", "OpticalFlow", "BFIFGrouper", "MaskPropagator", "PushPlanner", "ArmMotion")
 

@@ -4,11 +4,11 @@ from types import SimpleNamespace
 import numpy as np
 from rich.console import Console
 
-from riseg_drake.app import dry_run
-from riseg_drake.app.dry_run import DryRun
-from riseg_drake.app.interactions import Progress
+from riseg_drake.app.hardware import dry_run
+from riseg_drake.app.hardware.dry_run import DryRun
+from riseg_drake.app.hardware.terminal_operator import TerminalOperator
+from riseg_drake.app.run.interactions import Progress
 from riseg_drake.app.scenario import HARDWARE, load_scenario
-from riseg_drake.app.terminal_operator import TerminalOperator
 from riseg_drake.robot.kinematics import READY, PandaKinematics
 from riseg_drake.systems.arm_motion import Permission
 

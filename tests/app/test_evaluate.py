@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from riseg_drake.app import scene_work
 from riseg_drake.app.cli import main
-from riseg_drake.app.evaluate import evaluate, scene_tasks
+from riseg_drake.app.evaluate import scene_work
+from riseg_drake.app.evaluate.command import evaluate, scene_tasks
+from riseg_drake.app.evaluate.scene_folder import is_finished, read_result
+from riseg_drake.app.evaluate.scene_pool import PoolError, cluster_pool, local_pool
 from riseg_drake.app.output import RunFolder, Step
 from riseg_drake.app.output_folder import OutputError
 from riseg_drake.app.scenario import Scenario
-from riseg_drake.app.scene_folder import is_finished, read_result
-from riseg_drake.app.scene_pool import PoolError, cluster_pool, local_pool
 from riseg_drake.evaluation.in_motion import InMotion
 from riseg_drake.evaluation.scores import score
 
@@ -68,7 +68,7 @@ def scenes_run(monkeypatch):
 
     monkeypatch.setattr(scene_work, "run", run)
     monkeypatch.setattr(scene_work, "score_baselines", score_baselines)
-    monkeypatch.setattr("riseg_drake.app.evaluate.figure_png", lambda *_: b"")  # which takes longest
+    monkeypatch.setattr("riseg_drake.app.evaluate.command.figure_png", lambda *_: b"")  # which takes longest
     return seeds
 
 
@@ -183,9 +183,9 @@ def work_in_processes(seed_one_dies=""):
         import os
         import time
 
+        from riseg_drake.app.evaluate.scene_work import SceneOutcome
         from riseg_drake.app.output import RunFolder
         from riseg_drake.app.scenario import Scenario
-        from riseg_drake.app.scene_work import SceneOutcome
 
         def die(when):
             deaths = task.folder.parent / "deaths"
@@ -251,9 +251,9 @@ KILLED_PARENT = """
 import os, time
 from pathlib import Path
 from rich.console import Console
-from riseg_drake.app.evaluate import scene_tasks
+from riseg_drake.app.evaluate.command import scene_tasks
 from riseg_drake.app.scenario import Scenario
-from riseg_drake.app.scene_pool import local_pool
+from riseg_drake.app.evaluate.scene_pool import local_pool
 
 def work(task):
     (Path({folder!r}) / f"pid_{{os.getpid()}}").touch()
@@ -322,7 +322,7 @@ def test_without_shared_memory_several_jobs_are_refused_in_one_line(tmp_path, mo
     def no_semaphores(*_, **__):
         raise PermissionError(errno.EACCES, "Permission denied")
 
-    monkeypatch.setattr("riseg_drake.app.scene_pool.Parallel", no_semaphores)
+    monkeypatch.setattr("riseg_drake.app.evaluate.scene_pool.Parallel", no_semaphores)
     with pytest.raises(PoolError, match=r"is /dev/shm usable.*--jobs 1 needs none"):
         list(local_pool(2)(tasks(tmp_path, 2)))
 

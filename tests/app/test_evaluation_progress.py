@@ -1,6 +1,6 @@
 import pytest
 
-from riseg_drake.app.evaluation_progress import time_left
+from riseg_drake.app.evaluate.progress import time_left
 
 
 @pytest.mark.parametrize(

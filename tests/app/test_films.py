@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from riseg_drake.app import films
 from riseg_drake.app.cli import main
+from riseg_drake.app.evaluate import films
 from riseg_drake.recording.reader import RecordingReader
 from riseg_drake.stations.still_film import StillFilmParameters, still_film
 

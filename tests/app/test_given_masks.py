@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from riseg_drake.app.evaluate import scene_tasks
-from riseg_drake.app.given_masks import parse_given_masks, with_given_masks
+from riseg_drake.app.evaluate.command import scene_tasks
+from riseg_drake.app.evaluate.given_masks import parse_given_masks, with_given_masks
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.evaluation.label_folders import LabelFolderError
 from riseg_drake.evaluation.scene_result import SceneResult, scores_by_method

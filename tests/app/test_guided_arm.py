@@ -8,10 +8,10 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from riseg_drake.app import arm_travel, arm_watch
-from riseg_drake.app.arm_travel import TravelError, WayBack, straight_motion, travel
-from riseg_drake.app.arm_watch import ArmWatch
-from riseg_drake.app.interactions import Progress
+from riseg_drake.app.hardware import arm_travel, arm_watch
+from riseg_drake.app.hardware.arm_travel import TravelError, WayBack, straight_motion, travel
+from riseg_drake.app.hardware.arm_watch import ArmWatch
+from riseg_drake.app.run.interactions import Progress
 from riseg_drake.pushing.push import ArmPhase
 from riseg_drake.pushing.time_law import SpeedLimits
 from riseg_drake.robot.kinematics import PandaKinematics

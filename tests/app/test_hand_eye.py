@@ -5,8 +5,8 @@ import pytest
 from pydrake.lcm import DrakeLcm
 
 from riseg_drake.app.cli import main
-from riseg_drake.app.hand_eye import _Collector, _postures
-from riseg_drake.app.hardware import HardwareError
+from riseg_drake.app.hardware.command import HardwareError
+from riseg_drake.app.hardware.hand_eye import _Collector, _postures
 from riseg_drake.app.output_folder import SUMMARY
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.app.work_state import RunStoppedError
@@ -65,7 +65,7 @@ def test_a_check_that_does_not_come_to_its_end_says_so_in_its_summary(
     def wait(*_, **__):
         raise error
 
-    monkeypatch.setattr("riseg_drake.app.hand_eye.wait_for_drivers", wait)
+    monkeypatch.setattr("riseg_drake.app.hardware.hand_eye.wait_for_drivers", wait)
     scenario, out = tmp_path / "robot.yaml", tmp_path / "out"
     scenario.write_text('station: !HardwareStationConfig {lcm: {url: "memq://"}}\n')
     assert main(["hand-eye", str(scenario), "--yes", "--output", str(out)]) == code
@@ -76,7 +76,7 @@ def test_a_check_that_does_not_come_to_its_end_says_so_in_its_summary(
 
 
 def test_where_no_two_pictures_can_be_compared_the_check_has_failed(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("riseg_drake.app.hand_eye._watched_moves", lambda *_: [])
+    monkeypatch.setattr("riseg_drake.app.hardware.hand_eye._watched_moves", lambda *_: [])
     scenario, out = tmp_path / "robot.yaml", tmp_path / "out"
     scenario.write_text('station: !HardwareStationConfig {lcm: {url: "memq://"}}\n')
     assert main(["hand-eye", str(scenario), "--yes", "--output", str(out)]) == 2

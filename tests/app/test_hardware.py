@@ -6,19 +6,19 @@ from drake import lcmt_panda_status
 from pydrake.lcm import DrakeLcm
 from pydrake.math import RigidTransform
 
-from riseg_drake.app.arm_travel import TravelError, WayBack, straight_motion
+from riseg_drake.app.bench.stream import is_even
 from riseg_drake.app.cli import main
 from riseg_drake.app.diagram import make_diagram
-from riseg_drake.app.hardware import HardwareError, wait_for_drivers
-from riseg_drake.app.interactions import Progress
+from riseg_drake.app.hardware.arm_travel import TravelError, WayBack, straight_motion
+from riseg_drake.app.hardware.command import HardwareError, wait_for_drivers
 from riseg_drake.app.output import RunFolder
 from riseg_drake.app.output_folder import SUMMARY
 from riseg_drake.app.planned_speed import check_limits, planned_limits, push_parameters
-from riseg_drake.app.run import state_of
+from riseg_drake.app.run.command import state_of
+from riseg_drake.app.run.interactions import Progress
+from riseg_drake.app.run.truth_reception import TruthReception
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
-from riseg_drake.app.stream_bench import is_even
-from riseg_drake.app.truth_reception import TruthReception
 from riseg_drake.app.work_state import RunStoppedError
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pushing.time_law import SpeedLimits
@@ -321,7 +321,7 @@ def test_a_session_that_ends_while_it_waits_for_the_drivers_says_so_in_its_summa
     def wait(*_, **__):
         raise error
 
-    monkeypatch.setattr("riseg_drake.app.hardware.wait_for_drivers", wait)
+    monkeypatch.setattr("riseg_drake.app.hardware.command.wait_for_drivers", wait)
     scenario = tmp_path / "robot.yaml"
     scenario.write_text('station: !HardwareStationConfig {lcm: {url: "memq://"}}\n')
     assert main(["hardware", str(scenario), "--yes", "--output", str(tmp_path / "out")]) == code

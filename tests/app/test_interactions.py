@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from riseg_drake.app.interactions import Truth, _Book
+from riseg_drake.app.run.interactions import Truth, _Book
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pushing.push import NO_PUSH

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from riseg_drake.app.onlooker import Onlooker
+from riseg_drake.app.run.onlooker import Onlooker
 from riseg_drake.app.scenario import load_scenario
 from riseg_drake.stations.filmed_world import looking_at
 from riseg_drake.stations.simulated import SimulatedStation

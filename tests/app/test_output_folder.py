@@ -12,7 +12,7 @@ from riseg_drake.app import output
 from riseg_drake.app.cli import main
 from riseg_drake.app.output import RunFolder
 from riseg_drake.app.output_folder import OutputError, OutputFolder
-from riseg_drake.app.segment_folder import SegmentFolder
+from riseg_drake.app.segment.folder import SegmentFolder
 from riseg_drake.recording import whole_file
 from riseg_drake.recording.whole_file import GrowingText
 from tests.app.test_output import step

@@ -28,15 +28,15 @@ def test_all_pictures_are_made_and_can_be_opened(small_scenario, tmp_path):
 
 
 def test_a_folder_without_an_evaluation_is_one_line_before_anything_is_drawn(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("riseg_drake.app.pictures_command.require_graphics", lambda: None)
-    monkeypatch.setattr("riseg_drake.app.pictures_command.require_dot", lambda: None)
+    monkeypatch.setattr("riseg_drake.app.show.command.require_graphics", lambda: None)
+    monkeypatch.setattr("riseg_drake.app.show.command.require_dot", lambda: None)
     assert main(["pictures", "--output", str(tmp_path / "o"), "--evaluation", str(tmp_path)]) == 2
     assert "riseg evaluate" in capsys.readouterr().err
     assert not (tmp_path / "o").exists()
 
 
 def test_without_graphviz_nothing_is_begun(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("riseg_drake.app.pictures_command.require_graphics", lambda: None)
+    monkeypatch.setattr("riseg_drake.app.show.command.require_graphics", lambda: None)
     monkeypatch.setattr("shutil.which", lambda _: None)
     assert main(["pictures", "--output", str(tmp_path / "o")]) == 2
     assert "graphviz" in capsys.readouterr().err

@@ -3,7 +3,8 @@
 import pytest
 from rich.console import Console
 
-from riseg_drake.app import raft_bench, train_raft
+from riseg_drake.app import train_raft
+from riseg_drake.app.bench import raft as raft_bench
 from riseg_drake.app.cli import main
 from riseg_drake.learned.rigid_motion_pairs import PairParameters
 

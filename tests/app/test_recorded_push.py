@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from riseg_drake.app.bench.recorded_push import push_frames, push_images, put_through
 from riseg_drake.app.flow_method import flow_method
-from riseg_drake.app.recorded_push import push_frames, push_images, put_through
 from riseg_drake.app.scenario import load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.segmentation_block import make_segmentation, panda_view

@@ -5,9 +5,9 @@ import cv2
 import numpy as np
 import pytest
 
-from riseg_drake.app import bench
-from riseg_drake.app import run as run_module
+from riseg_drake.app.bench import command as bench
 from riseg_drake.app.cli import main
+from riseg_drake.app.run import command as run_module
 from riseg_drake.evaluation.in_motion import overlap_f_of
 from riseg_drake.evaluation.scores import score
 from riseg_drake.recording.reader import RecordingReader

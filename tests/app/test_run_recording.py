@@ -5,10 +5,10 @@ import pytest
 from pydrake.common.yaml import yaml_dump_typed
 
 from riseg_drake.app.diagram import make_diagram
-from riseg_drake.app.interactions import Progress, Truth, interactions, simulated_truth
-from riseg_drake.app.run_recording import recording_of
+from riseg_drake.app.run.interactions import Progress, Truth, interactions, simulated_truth
+from riseg_drake.app.run.recording import recording_of
 from riseg_drake.app.scenario import HARDWARE, load_scenario
-from riseg_drake.app.segment_command import SegmentRequest, _parameters
+from riseg_drake.app.segment.command import SegmentRequest, _parameters
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.recording.reader import RecordingReader
 from riseg_drake.robot.kinematics import READY

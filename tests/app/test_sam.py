@@ -7,10 +7,11 @@ import cv2
 import numpy as np
 import pytest
 
-from riseg_drake.app import refinement_block, sam_bench
+from riseg_drake.app import refinement_block
+from riseg_drake.app.bench import sam as sam_bench
 from riseg_drake.app.cli import main
 from riseg_drake.app.diagram import make_diagram
-from riseg_drake.app.interactions import Progress, interactions
+from riseg_drake.app.run.interactions import Progress, interactions
 from riseg_drake.app.scenario import load_scenario
 from riseg_drake.evaluation.scores import score
 from riseg_drake.learned.prompts import Answer

@@ -5,9 +5,9 @@ import cv2
 import numpy as np
 import pytest
 
-from riseg_drake.app import segment_command as module
 from riseg_drake.app.cli import main
-from riseg_drake.app.interactions import interactions
+from riseg_drake.app.run.interactions import interactions
+from riseg_drake.app.segment import command as module
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.recording.reader import RecordingReader
 from tests.recording.made_recordings import SMALL, drawn_frames, write
@@ -173,7 +173,7 @@ def test_a_recorded_run_gives_the_masks_of_the_run_bit_for_bit_in_every_frame(
 
         yield from interactions(diagram, clock, progress, longest, (*listeners, keep))
 
-    monkeypatch.setattr("riseg_drake.app.run.interactions", listening)
+    monkeypatch.setattr("riseg_drake.app.run.command.interactions", listening)
     assert main(["run", str(small_scenario), "--seed", "1", "--record", "--output", str(run)]) == 0
     output = tmp_path / "out"
     assert main(["segment", str(run / "recording"), "--output", str(output)]) == 0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from riseg_drake.app.stop_bench import NoMotionError, judged
+from riseg_drake.app.bench.stop import NoMotionError, judged
 from riseg_drake.robot.command_stream import CommandParameters
 from riseg_drake.robot.limits import PANDA_LIMITS
 

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from riseg_drake.app import scene_work
 from riseg_drake.app.cli import main
+from riseg_drake.app.evaluate import scene_work
+from riseg_drake.app.evaluate.scene_pool import local_pool
+from riseg_drake.app.evaluate.suite import evaluate_suite, find_suite, kind_tasks
 from riseg_drake.app.output import RunFolder, Step
 from riseg_drake.app.output_folder import OutputError
 from riseg_drake.app.scenario_file import ScenarioError
-from riseg_drake.app.scene_pool import local_pool
-from riseg_drake.app.suite import evaluate_suite, find_suite, kind_tasks
 from riseg_drake.evaluation.baselines import BASELINES
 from riseg_drake.evaluation.in_motion import InMotion
 from riseg_drake.evaluation.scores import score
@@ -45,7 +45,7 @@ def runs(monkeypatch):
 
     monkeypatch.setattr(scene_work, "run", run)
     monkeypatch.setattr(scene_work, "score_baselines", score_baselines)
-    monkeypatch.setattr("riseg_drake.app.evaluate.figure_png", lambda *_: b"")  # which takes longest
+    monkeypatch.setattr("riseg_drake.app.evaluate.command.figure_png", lambda *_: b"")  # which takes longest
     return made
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from riseg_drake.app.terminal_operator import TerminalOperator
+from riseg_drake.app.hardware.terminal_operator import TerminalOperator
 from riseg_drake.pushing.push import Push
 from riseg_drake.systems.arm_motion import Permission
 

@@ -1,6 +1,6 @@
 """docs/paper.md against `riseg evaluate --ablation`: its literal scenario, and the rows of its table."""
 
-from riseg_drake.app.ablation import LITERAL, switched, versions
+from riseg_drake.app.evaluate.ablation import LITERAL, switched, versions
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.scenario_file import parse_scenario
 from tests.docs.pages import CHECKOUT, blocks, section, table_rows

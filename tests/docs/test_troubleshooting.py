@@ -13,10 +13,10 @@ import pytest
 from drake import lcmt_image_array, lcmt_panda_status
 
 from riseg_drake.app.cli import main
-from riseg_drake.app.hardware import PATIENCE, HardwareError, wait_for_drivers
+from riseg_drake.app.hardware.command import PATIENCE, HardwareError, wait_for_drivers
 from riseg_drake.app.output import RunFolder
-from riseg_drake.app.replay import Replay
 from riseg_drake.app.scenario import HARDWARE, Scenario, load_scenario
+from riseg_drake.app.segment.replay import Replay
 from riseg_drake.recording.layout import RecordedFrame
 from riseg_drake.segmentation.above_table import AboveTableParameters, objects_above_table
 from riseg_drake.stations import lcm_channels

@@ -14,11 +14,11 @@ import cv2
 import numpy as np
 
 from riseg_drake.app.cli import _mistakes, main
-from riseg_drake.app.evaluate import scene_tasks
+from riseg_drake.app.evaluate.command import scene_tasks
+from riseg_drake.app.evaluate.scene_folder import is_finished, read_result
 from riseg_drake.app.output_folder import OutputFolder
-from riseg_drake.app.recorded_view import recorded_view
 from riseg_drake.app.scenario import Scenario, load_scenario
-from riseg_drake.app.scene_folder import is_finished, read_result
+from riseg_drake.app.segment.recorded_view import recorded_view
 from riseg_drake.evaluation.disturbance import ObjectMotion
 from riseg_drake.evaluation.report import report_text
 from riseg_drake.evaluation.scores import score

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from riseg_drake.app.replay import Replay
 from riseg_drake.app.scenario import Scenario
+from riseg_drake.app.segment.replay import Replay
 from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.recording.layout import RecordedFrame

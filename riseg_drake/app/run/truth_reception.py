@@ -7,7 +7,7 @@ from drake import lcmt_image_array, lcmt_viewer_draw
 from pydrake.lcm import DrakeLcmInterface
 from pydrake.systems.framework import Context
 
-from riseg_drake.app.interactions import Truth
+from riseg_drake.app.run.interactions import Truth
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.stations.arm_messages import array_time
 from riseg_drake.stations.ground_truth import LABEL_CHANNEL, POSE_CHANNEL, decode_labels, decode_poses

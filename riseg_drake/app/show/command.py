@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from riseg_drake.app.diagram import make_diagram
-from riseg_drake.app.drawing import draw, render, require_dot
-from riseg_drake.app.film import film_run
 from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.output import Step
 from riseg_drake.app.output_folder import OutputError
 from riseg_drake.app.scenario import BUILT_IN, HARDWARE, load_scenario
+from riseg_drake.app.show.drawing import draw, render, require_dot
+from riseg_drake.app.show.film import film_run
 from riseg_drake.evaluation.report import FIGURE_FILE
 from riseg_drake.geometry.camera import WHOLE, bounding_region
 from riseg_drake.pictures.animation import gif

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from riseg_drake.app.ablation import versions
+from riseg_drake.app.evaluate.ablation import versions
 from riseg_drake.app.output import RECORDING
 from riseg_drake.app.output_folder import SUMMARY, read_json, to_json
 from riseg_drake.evaluation.baselines import BASELINES

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from pydrake.trajectories import PiecewisePolynomial
 from rich.console import Console
 
-from riseg_drake.app.arm_travel import straight_motion, travel
-from riseg_drake.app.hardware import HardwareError, listening, wait_for_drivers
+from riseg_drake.app.hardware.arm_travel import straight_motion, travel
+from riseg_drake.app.hardware.command import HardwareError, listening, wait_for_drivers
+from riseg_drake.app.hardware.terminal_operator import TerminalOperator
 from riseg_drake.app.output_folder import OutputFolder
 from riseg_drake.app.planned_speed import check_limits, planned_limits
 from riseg_drake.app.scenario import HARDWARE, Scenario, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
-from riseg_drake.app.terminal_operator import TerminalOperator
 from riseg_drake.app.work_state import end_noted
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pushing.time_law import SpeedLimits

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from pydrake.systems.framework import Context
 
 from riseg_drake.app.diagram import make_diagram
-from riseg_drake.app.interactions import Progress, interactions
-from riseg_drake.app.onlooker import Onlooker
 from riseg_drake.app.output import Step
+from riseg_drake.app.run.interactions import Progress, interactions
+from riseg_drake.app.run.onlooker import Onlooker
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pictures.animation import side_by_side

@@ -8,10 +8,10 @@ from typing import Any
 
 from rich.console import Console
 
+from riseg_drake.app.bench.recorded_push import StationOutputs, push_images, put_through
 from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.output import stage_figures
-from riseg_drake.app.recorded_push import StationOutputs, push_images, put_through
-from riseg_drake.app.run import peak_memory_mb
+from riseg_drake.app.run.command import peak_memory_mb
 from riseg_drake.app.scenario import Scenario, load_scenario
 from riseg_drake.app.segmentation_block import make_segmentation, panda_view
 from riseg_drake.app.tables import stage_table
@@ -37,13 +37,13 @@ def bench_command(
     with console.status("rendering a push"):
         images = push_images(scenario, seed)
     if stream:
-        from riseg_drake.app.stream_bench import bench_stream
+        from riseg_drake.app.bench.stream import bench_stream
 
         with console.status(f"sending commands for {stream} s"):
             bench_stream(scenario, images, stream, console)
         return
     if sam:
-        from riseg_drake.app.sam_bench import bench_sam
+        from riseg_drake.app.bench.sam import bench_sam
 
         return bench_sam(scenario, images, console)
     with console.status("measuring time"):

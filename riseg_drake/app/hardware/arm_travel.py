@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.trajectories import PiecewisePolynomial
 
-from riseg_drake.app.terminal_operator import TerminalOperator
+from riseg_drake.app.hardware.terminal_operator import TerminalOperator
 from riseg_drake.geometry.se3 import translation
 from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest
 from riseg_drake.robot.kinematics import MIN_CLEARANCE, PandaKinematics

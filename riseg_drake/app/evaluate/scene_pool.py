@@ -14,10 +14,10 @@ from joblib import Parallel, cpu_count, delayed, parallel_config
 from joblib.externals.loky.backend import resource_tracker as loky_resource_tracker
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
+from riseg_drake.app.evaluate.scene_folder import SceneTask, note_death
+from riseg_drake.app.evaluate.scene_work import SceneOutcome, work_on
 from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.output import RECORDING
-from riseg_drake.app.scene_folder import SceneTask, note_death
-from riseg_drake.app.scene_work import SceneOutcome, work_on
 from riseg_drake.host.processes import deaf_children, end_with_parent, undisturbed
 from riseg_drake.recording.whole_file import write_bytes
 

@@ -14,7 +14,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from rich.console import Console
 
-from riseg_drake.app.bench import StationOutputs
+from riseg_drake.app.bench.command import StationOutputs
 from riseg_drake.app.output import stage_figures
 from riseg_drake.app.refinement_block import REFINER_OFFSET
 from riseg_drake.app.scenario import Scenario

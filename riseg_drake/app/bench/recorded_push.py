@@ -8,7 +8,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram
 
 from riseg_drake.app.diagram import WiredDiagram, make_diagram
-from riseg_drake.app.interactions import Progress, interactions
+from riseg_drake.app.run.interactions import Progress, interactions
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.segmentation_block import STATION_PORTS

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
-from riseg_drake.app.bench import segment_once
-from riseg_drake.app.recorded_push import StationOutputs
+from riseg_drake.app.bench.command import segment_once
+from riseg_drake.app.bench.recorded_push import StationOutputs
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.robot.command_stream import CommandParameters
 from riseg_drake.robot.description import PandaDescription

@@ -3,8 +3,8 @@
 from functools import lru_cache
 from pathlib import Path
 
+from riseg_drake.app.evaluate.scene_baselines import ObservationView, above_table
 from riseg_drake.app.scenario import Scenario
-from riseg_drake.app.scene_baselines import ObservationView, above_table
 from riseg_drake.evaluation.label_folders import read_labels
 from riseg_drake.evaluation.scene_result import OURS_WITH_SAM, SAM, SAM_METHODS
 from riseg_drake.evaluation.scores import Scores, score

@@ -5,10 +5,10 @@ import time
 
 from pydrake.systems.framework import Context
 
-from riseg_drake.app.arm_travel import TravelError, WayBack, told
 from riseg_drake.app.diagram import WiredDiagram
-from riseg_drake.app.interactions import Progress
-from riseg_drake.app.terminal_operator import TerminalOperator
+from riseg_drake.app.hardware.arm_travel import TravelError, WayBack, told
+from riseg_drake.app.hardware.terminal_operator import TerminalOperator
+from riseg_drake.app.run.interactions import Progress
 from riseg_drake.pushing.push import NO_PUSH, ArmPhase, Push
 from riseg_drake.robot.supervisor import Cause, Mode
 from riseg_drake.stations.command_process import CommandProcess

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from riseg_drake.app.scene_folder import SceneTask
+from riseg_drake.app.evaluate.scene_folder import SceneTask
 from riseg_drake.evaluation.label_folders import LabelFolderError, read_labels
 from riseg_drake.evaluation.scene_result import SceneResult
 from riseg_drake.evaluation.scores import Scores, score

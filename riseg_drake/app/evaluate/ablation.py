@@ -9,8 +9,8 @@ from functools import reduce
 from pathlib import Path
 from typing import Any
 
-from riseg_drake.app.replay import Replay
 from riseg_drake.app.scenario import Scenario
+from riseg_drake.app.segment.replay import Replay
 from riseg_drake.app.segmentation_block import panda_view
 from riseg_drake.evaluation.scores import Scores, score
 from riseg_drake.recording.layout import RecordedFrame, RecordingError

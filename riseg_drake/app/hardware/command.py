@@ -12,19 +12,19 @@ from pydrake.systems.framework import Context
 from pydrake.trajectories import PiecewisePolynomial
 from rich.console import Console
 
-from riseg_drake.app.arm_travel import ARRIVED, WayBack, straight_motion, travel
-from riseg_drake.app.arm_watch import ArmWatch
 from riseg_drake.app.diagram import Drivers, WiredDiagram, make_diagram
-from riseg_drake.app.dry_run import DryRun
-from riseg_drake.app.interactions import Listener, Progress, TruthSource, WallClock, interactions
+from riseg_drake.app.hardware.arm_travel import ARRIVED, WayBack, straight_motion, travel
+from riseg_drake.app.hardware.arm_watch import ArmWatch
+from riseg_drake.app.hardware.dry_run import DryRun
+from riseg_drake.app.hardware.terminal_operator import TerminalOperator
 from riseg_drake.app.output import RECORDING, RunFolder, Step
 from riseg_drake.app.planned_speed import check_limits, planned_limits
-from riseg_drake.app.run import Narrator, report, state_of
-from riseg_drake.app.run_recording import recording_of
+from riseg_drake.app.run.command import Narrator, report, state_of
+from riseg_drake.app.run.interactions import Listener, Progress, TruthSource, WallClock, interactions
+from riseg_drake.app.run.recording import recording_of
+from riseg_drake.app.run.truth_reception import TruthReception
 from riseg_drake.app.scenario import HARDWARE, Scenario, load_scenario, scenario_name
 from riseg_drake.app.scenario_file import ScenarioError
-from riseg_drake.app.terminal_operator import TerminalOperator
-from riseg_drake.app.truth_reception import TruthReception
 from riseg_drake.app.work_state import RunStoppedError
 from riseg_drake.pushing.push import Push
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture

@@ -6,9 +6,9 @@ import numpy as np
 from pydrake.geometry import Meshcat, Rgba
 from rich.console import Console
 
-from riseg_drake.app.interactions import Progress
+from riseg_drake.app.hardware.terminal_operator import TerminalOperator
+from riseg_drake.app.run.interactions import Progress
 from riseg_drake.app.scenario import Scenario
-from riseg_drake.app.terminal_operator import TerminalOperator
 from riseg_drake.pushing.push import Push
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.systems.arm_motion import Permission

@@ -11,12 +11,12 @@ from typing import Any
 from pydrake.common.yaml import yaml_dump_typed
 from rich.console import Console
 
-from riseg_drake.app.evaluation_progress import EvaluationProgress
-from riseg_drake.app.given_masks import parse_given_masks, with_given_masks
+from riseg_drake.app.evaluate.given_masks import parse_given_masks, with_given_masks
+from riseg_drake.app.evaluate.progress import EvaluationProgress
+from riseg_drake.app.evaluate.scene_folder import SceneTask, digest, is_finished, read_result
+from riseg_drake.app.evaluate.scene_pool import Pool, pool_for
 from riseg_drake.app.output_folder import OutputFolder
 from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
-from riseg_drake.app.scene_folder import SceneTask, digest, is_finished, read_result
-from riseg_drake.app.scene_pool import Pool, pool_for
 from riseg_drake.app.tables import score_table
 from riseg_drake.evaluation.disturbance import disturbance_of_all, disturbance_of_steps
 from riseg_drake.evaluation.figure import figure_png

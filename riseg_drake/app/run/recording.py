@@ -8,8 +8,8 @@ from pydrake.common.yaml import yaml_dump_typed
 from pydrake.systems.framework import Context
 
 from riseg_drake.app.diagram import WiredDiagram
-from riseg_drake.app.interactions import Listener, TruthSource
 from riseg_drake.app.output_folder import to_json
+from riseg_drake.app.run.interactions import Listener, TruthSource
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.recording.layout import RUN_FILE, SCENARIO_FILE, RecordedFrame

@@ -16,14 +16,14 @@ from typing import Any
 from rich.console import Console
 from rich.progress import track
 
-from riseg_drake.app.depth_figures import DEPTH_PICTURE, depth_figures, depth_table, draw_depth
+from riseg_drake.app.evaluate.depth_figures import DEPTH_PICTURE, depth_figures, depth_table, draw_depth
+from riseg_drake.app.evaluate.scene_work import limited_threads
 from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.output import RECORDING
 from riseg_drake.app.output_folder import OutputFolder, read_json, to_json
-from riseg_drake.app.recorded_view import recorded_view
-from riseg_drake.app.replay import Replay
 from riseg_drake.app.scenario import load_scenario
-from riseg_drake.app.scene_work import limited_threads
+from riseg_drake.app.segment.recorded_view import recorded_view
+from riseg_drake.app.segment.replay import Replay
 from riseg_drake.evaluation.film_scores import FilmScores, film_table
 from riseg_drake.evaluation.true_things import true_things
 from riseg_drake.geometry.plane import NoPlaneError

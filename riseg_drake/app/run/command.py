@@ -16,9 +16,9 @@ from rich.status import Status
 
 from riseg_drake.app.diagram import WiredDiagram, make_diagram
 from riseg_drake.app.graphics import require_graphics
-from riseg_drake.app.interactions import Listener, Progress, interactions, simulated_truth
 from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step, stage_figures
-from riseg_drake.app.run_recording import recording_of
+from riseg_drake.app.run.interactions import Listener, Progress, interactions, simulated_truth
+from riseg_drake.app.run.recording import recording_of
 from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
 from riseg_drake.app.tables import score_table, stage_table
 from riseg_drake.app.work_state import end_noted

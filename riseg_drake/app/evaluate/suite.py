@@ -18,14 +18,14 @@ from typing import Any
 
 from rich.console import Console
 
-from riseg_drake.app.evaluate import REPORT, EvaluationError, interruption_told, scene_tasks
-from riseg_drake.app.evaluation_progress import EvaluationProgress
+from riseg_drake.app.evaluate.command import REPORT, EvaluationError, interruption_told, scene_tasks
+from riseg_drake.app.evaluate.progress import EvaluationProgress
+from riseg_drake.app.evaluate.scene_folder import SceneTask, digest, is_finished, read_result
+from riseg_drake.app.evaluate.scene_pool import Pool, pool_for
+from riseg_drake.app.evaluate.scene_work import SceneOutcome
 from riseg_drake.app.output_folder import OutputFolder
 from riseg_drake.app.scenario import Scenario, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
-from riseg_drake.app.scene_folder import SceneTask, digest, is_finished, read_result
-from riseg_drake.app.scene_pool import Pool, pool_for
-from riseg_drake.app.scene_work import SceneOutcome
 from riseg_drake.app.tables import score_table
 from riseg_drake.evaluation.figure import figure_png
 from riseg_drake.evaluation.report import FIGURE_FILE, report_text

@@ -14,11 +14,11 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from riseg_drake.app.output import RECORDING, confidence_figures, stage_figures
-from riseg_drake.app.recorded_view import RecordedView, recorded_view
-from riseg_drake.app.replay import Replay
-from riseg_drake.app.run import peak_memory_mb
+from riseg_drake.app.run.command import peak_memory_mb
 from riseg_drake.app.scenario import Scenario, load_scenario
-from riseg_drake.app.segment_folder import SegmentFolder
+from riseg_drake.app.segment.folder import SegmentFolder
+from riseg_drake.app.segment.recorded_view import RecordedView, recorded_view
+from riseg_drake.app.segment.replay import Replay
 from riseg_drake.app.tables import score_table, stage_table
 from riseg_drake.app.work_state import end_noted
 from riseg_drake.evaluation.scores import FIGURES, Scores, score

@@ -9,15 +9,10 @@ from time import perf_counter
 import cv2
 from threadpoolctl import threadpool_limits
 
-from riseg_drake.app.ablation import ablate
-from riseg_drake.app.output import RECORDING, RunFolder
-from riseg_drake.app.output_folder import SUMMARY, OutputError, read_json, to_json
-from riseg_drake.app.run import run
-from riseg_drake.app.sam_baseline import score_sam
-from riseg_drake.app.scenario import Scenario
-from riseg_drake.app.scenario_file import parse_scenario
-from riseg_drake.app.scene_baselines import score_baselines
-from riseg_drake.app.scene_folder import (
+from riseg_drake.app.evaluate.ablation import ablate
+from riseg_drake.app.evaluate.sam_baseline import score_sam
+from riseg_drake.app.evaluate.scene_baselines import score_baselines
+from riseg_drake.app.evaluate.scene_folder import (
     ABLATION_FILE,
     BASELINE_FILE,
     SceneTask,
@@ -25,6 +20,11 @@ from riseg_drake.app.scene_folder import (
     missing_baselines,
     run_is_usable,
 )
+from riseg_drake.app.output import RECORDING, RunFolder
+from riseg_drake.app.output_folder import SUMMARY, OutputError, read_json, to_json
+from riseg_drake.app.run.command import run
+from riseg_drake.app.scenario import Scenario
+from riseg_drake.app.scenario_file import parse_scenario
 from riseg_drake.evaluation.baselines import BASELINES
 from riseg_drake.evaluation.scene_result import SAM_METHODS
 from riseg_drake.evaluation.scores import Scores

@@ -1,0 +1,1 @@
+"""How fast it is: `riseg bench` and its like."""

@@ -1,0 +1,1 @@
+"""Many scenes, many films, scores: `riseg evaluate`, `riseg score`."""

@@ -1,0 +1,1 @@
+"""One scene, pushed until nothing is in doubt: `riseg run`."""

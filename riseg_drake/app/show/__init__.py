@@ -1,0 +1,1 @@
+"""What it looks like: drawings of diagrams, films, `riseg pictures`."""
