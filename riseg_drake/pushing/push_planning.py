@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +25,29 @@ class PushPlanningParameters:
     path: PushPathParameters = field(default_factory=PushPathParameters)
 
 
+@runtime_checkable
+class ObjectsAboveTable(Protocol):
+    """GetObjsAboveTable of one frame (Alg. 3, line 1), by whatever tells what stands on the table."""
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """[H, W], objMask."""
+        ...
+
+    @property
+    def height(self) -> NDArray[np.floating]:
+        """[H, W], m above the table."""
+        ...
+
+    @property
+    def plane_W(self) -> NDArray[np.float64]:
+        """[4], the table top, n . p_WQ + d is the height of Q."""
+        ...
+
+
 def plan_push(
     frame: Frame,
-    objects: NDArray[np.bool_],
-    height: NDArray,
-    plane_W: NDArray,
+    above: ObjectsAboveTable,
     mask: NDArray,
     q_observe: NDArray,
     kinematics: PandaKinematics,
@@ -41,9 +60,7 @@ def plan_push(
 
     Args:
         frame: what the camera saw from that posture.
-        objects: [H, W], GetObjsAboveTable of the frame.
-        height: [H, W], height above the table, m.
-        plane_W: [4], the table top.
+        above: what stands on the table there.
         mask: [H, W], L_t without the objects in doubt.
         q_observe: [7], where the arm is and returns to, rad.
         kinematics: of the arm.
@@ -58,10 +75,10 @@ def plan_push(
         frame.depth,
         frame.intrinsics,
         frame.X_WC,
-        objects,
-        height,
+        above.mask,
+        above.height,
         mask,
-        plane_W,
+        above.plane_W,
         robot=frame.robot,
         parameters=parameters.action.table,
         found=found,

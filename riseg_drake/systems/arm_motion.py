@@ -17,6 +17,7 @@ from riseg_drake.pushing.push import NO_PUSH, ArmPhase, Push
 from riseg_drake.pushing.time_law import minimum_jerk
 from riseg_drake.pushing.tried_pushes import SegmentedSoFar, TriedPush, segmented_so_far
 from riseg_drake.systems.memory import replace_memory
+from riseg_drake.systems.value_input import ValueInput
 
 
 class Permission(Enum):
@@ -135,10 +136,10 @@ class ArmMotion(LeafSystem):
         self._permit = permit
         self._done_until = done_until
         self._way_back = way_back
-        self._decision = self.DeclareAbstractInputPort("decision", AbstractValue.Make(UNDECIDED))
-        self._pair = self.DeclareAbstractInputPort("pair", AbstractValue.Make(NO_PAIR))
-        self._mask = self.DeclareAbstractInputPort("mask", AbstractValue.Make(NO_MASK))
-        self._decided = self.DeclareAbstractInputPort("decided", AbstractValue.Make(True))
+        self._decision = ValueInput(self, "decision", UNDECIDED)
+        self._pair = ValueInput(self, "pair", NO_PAIR)
+        self._mask = ValueInput(self, "mask", NO_MASK)
+        self._decided = ValueInput(self, "decided", True)
         self._measured = self.DeclareVectorInputPort("position_measured", 7)
         self._memory = self.DeclareAbstractState(AbstractValue.Make(_Memory()))
         state = {self.abstract_state_ticket(self._memory)}
@@ -206,7 +207,7 @@ class ArmMotion(LeafSystem):
             return memory if memory.rest_since is None else replace(memory, rest_since=None)
         if memory.rest_since is None:
             return replace(memory, rest_since=time)
-        pair: FramePair = self._pair.Eval(context)
+        pair = self._pair.Eval(context)
         decided = not self._decided.HasValue(context) or self._decided.Eval(context)
         settle = parameters.settle_time if decided else parameters.settle_longest
         if pair is NO_PAIR or pair.current.time < memory.rest_since + settle:
@@ -216,7 +217,7 @@ class ArmMotion(LeafSystem):
         if memory.asked == pair.current.sequence:
             return memory
 
-        decision: Decision = self._decision.Eval(context)
+        decision = self._decision.Eval(context)
         memory = replace(memory, decision=decision, asked=pair.current.sequence)
         if memory.interaction_step >= parameters.most_interactions:
             return replace(memory, decision=_enough(decision), done=True)

@@ -4,11 +4,12 @@ import numpy as np
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from riseg_drake.geometry.rgbd import NO_PAIR, FramePair
+from riseg_drake.geometry.rgbd import NO_PAIR
 from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
 from riseg_drake.segmentation.bfif import BFIFParameters, group_body_frames, no_groups
 from riseg_drake.segmentation.optical_flow import NO_FLOW
 from riseg_drake.systems.stage_clock import timed
+from riseg_drake.systems.value_input import ValueInput
 
 
 class BFIFGrouper(LeafSystem):
@@ -32,15 +33,10 @@ class BFIFGrouper(LeafSystem):
         super().__init__()
         self.set_name("BFIFGrouper")
         self._parameters, self._seed = parameters or BFIFParameters(), seed
-        self._pair, self._expected_flow, self._optical_flow, self._above = (
-            self.DeclareAbstractInputPort(name, AbstractValue.Make(model))
-            for name, model in (
-                ("pair", NO_PAIR),
-                ("expected_flow", NO_FLOW),
-                ("optical_flow", NO_FLOW),
-                ("above_table", NOTHING_ABOVE_TABLE),
-            )
-        )
+        self._pair = ValueInput(self, "pair", NO_PAIR)
+        self._expected_flow = ValueInput(self, "expected_flow", NO_FLOW)
+        self._optical_flow = ValueInput(self, "optical_flow", NO_FLOW)
+        self._above = ValueInput(self, "above_table", NOTHING_ABOVE_TABLE)
         self._groups = self.DeclareAbstractOutputPort(
             "groups",
             AbstractValue.Make(no_groups()).Clone,
@@ -53,7 +49,7 @@ class BFIFGrouper(LeafSystem):
 
     @timed
     def _calc_groups(self, context: Context, output: AbstractValue) -> None:
-        pair: FramePair = self._pair.Eval(context)
+        pair = self._pair.Eval(context)
         if pair is NO_PAIR:
             output.set_value(no_groups())
             return

@@ -3,12 +3,13 @@
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, LeafSystem
 
-from riseg_drake.geometry.rgbd import NO_PAIR, FramePair
+from riseg_drake.geometry.rgbd import NO_PAIR
 from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
 from riseg_drake.segmentation.camera_motion import CameraMotionParameters, PoseError, settled_pair
 from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.optical_flow import NO_FLOW
 from riseg_drake.systems.stage_clock import timed
+from riseg_drake.systems.value_input import ValueInput
 
 
 class CameraMotion(LeafSystem):
@@ -31,16 +32,11 @@ class CameraMotion(LeafSystem):
         super().__init__()
         self.set_name("CameraMotion")
         self._parameters, self._noise = parameters or CameraMotionParameters(), noise or MeasurementNoise()
-        self._stages = [
-            self.DeclareAbstractInputPort(name, AbstractValue.Make(model))
-            for name, model in (
-                ("pair", NO_PAIR),
-                ("optical_flow", NO_FLOW),
-                ("above_table_reference", NOTHING_ABOVE_TABLE),
-                ("above_table", NOTHING_ABOVE_TABLE),
-                ("pose_error", PoseError()),
-            )
-        ]
+        self._pair = ValueInput(self, "pair", NO_PAIR)
+        self._optical_flow = ValueInput(self, "optical_flow", NO_FLOW)
+        self._above_0 = ValueInput(self, "above_table_reference", NOTHING_ABOVE_TABLE)
+        self._above_1 = ValueInput(self, "above_table", NOTHING_ABOVE_TABLE)
+        self._pose_error = ValueInput(self, "pose_error", PoseError())
         self.DeclareAbstractOutputPort(
             "pair",
             AbstractValue.Make(NO_PAIR).Clone,
@@ -50,8 +46,15 @@ class CameraMotion(LeafSystem):
 
     @timed
     def _calc_pair(self, context: Context, output: AbstractValue) -> None:
-        pair: FramePair
-        pair, optical_flow, above_0, above_1, error = (stage.Eval(context) for stage in self._stages)
+        pair = self._pair.Eval(context)
         if pair is not NO_PAIR:
-            pair = settled_pair(pair, optical_flow, above_0, above_1, error, self._noise, self._parameters)
+            pair = settled_pair(
+                pair,
+                self._optical_flow.Eval(context),
+                self._above_0.Eval(context),
+                self._above_1.Eval(context),
+                self._pose_error.Eval(context),
+                self._noise,
+                self._parameters,
+            )
         output.set_value(pair)

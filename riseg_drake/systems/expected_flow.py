@@ -3,10 +3,11 @@
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, LeafSystem
 
-from riseg_drake.geometry.rgbd import NO_PAIR, FramePair
+from riseg_drake.geometry.rgbd import NO_PAIR
 from riseg_drake.segmentation.expected_flow import expected_flow
 from riseg_drake.segmentation.optical_flow import NO_FLOW
 from riseg_drake.systems.stage_clock import timed
+from riseg_drake.systems.value_input import ValueInput
 
 
 class ExpectedFlow(LeafSystem):
@@ -22,7 +23,7 @@ class ExpectedFlow(LeafSystem):
     def __init__(self) -> None:
         super().__init__()
         self.set_name("ExpectedFlow")
-        self._pair = self.DeclareAbstractInputPort("pair", AbstractValue.Make(NO_PAIR))
+        self._pair = ValueInput(self, "pair", NO_PAIR)
         self.DeclareAbstractOutputPort(
             "expected_flow",
             AbstractValue.Make(NO_FLOW).Clone,
@@ -32,7 +33,7 @@ class ExpectedFlow(LeafSystem):
 
     @timed
     def _calc_expected_flow(self, context: Context, output: AbstractValue) -> None:
-        pair: FramePair = self._pair.Eval(context)
+        pair = self._pair.Eval(context)
         if pair is NO_PAIR:
             output.set_value(NO_FLOW)
             return

@@ -10,6 +10,7 @@ from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
 from riseg_drake.segmentation.camera_motion import CameraMotionParameters
 from riseg_drake.segmentation.frame_pairs import FramePairParameters
 from riseg_drake.segmentation.remembered_pair import RememberedPair, with_frame
+from riseg_drake.systems.value_input import ValueInput
 
 
 class FramePairMemory(LeafSystem):
@@ -44,8 +45,8 @@ class FramePairMemory(LeafSystem):
         self.set_name("FramePair")
         self._parameters = parameters or FramePairParameters()
         self._camera_motion = camera_motion or CameraMotionParameters()
-        self._frame = self.DeclareAbstractInputPort("frame", AbstractValue.Make(NO_FRAME))
-        self._above = self.DeclareAbstractInputPort("above_table", AbstractValue.Make(NOTHING_ABOVE_TABLE))
+        self._frame = ValueInput(self, "frame", NO_FRAME)
+        self._above = ValueInput(self, "above_table", NOTHING_ABOVE_TABLE)
         self._flow_span = self.DeclareVectorInputPort("flow_span", 1)
         self._memory = self.DeclareAbstractState(AbstractValue.Make(RememberedPair()))
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, offset, self._take_frame)

@@ -12,6 +12,7 @@ from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import NO_FRAME, Frame, sanitize_depth
 from riseg_drake.systems.stage_clock import timed
+from riseg_drake.systems.value_input import ValueInput
 
 
 class FrameView(LeafSystem):
@@ -53,9 +54,9 @@ class FrameView(LeafSystem):
         if X_WC is not None or robot_mask is not None:
             self._position = self.DeclareVectorInputPort("position", num_positions)
         if X_WC is None:
-            self.DeclareAbstractInputPort("camera_pose", AbstractValue.Make(np.eye(4)))
+            self._pose = ValueInput(self, "camera_pose", np.eye(4))
         if robot_mask is None:
-            self.DeclareAbstractInputPort("robot_pixels", AbstractValue.Make(NO_FRAME.robot))
+            self._robot_pixels = ValueInput(self, "robot_pixels", NO_FRAME.robot)
         self.DeclareAbstractOutputPort(
             "frame",
             AbstractValue.Make(NO_FRAME).Clone,
@@ -82,9 +83,9 @@ class FrameView(LeafSystem):
                 f"images of {color.width()}x{color.height()} (colour) and {depth.width()}x{depth.height()} "
                 f"(depth), but the intrinsics are for {self._intrinsics.width}x{self._intrinsics.height}"
             )
-        X_WC, robot = (
-            self.GetInputPort(name).Eval(context) if of_position is None else of_position(self._q(context))
-            for of_position, name in ((self._X_WC, "camera_pose"), (self._robot_mask, "robot_pixels"))
+        X_WC = self._pose.Eval(context) if self._X_WC is None else self._X_WC(self._q(context))
+        robot = (
+            self._robot_pixels.Eval(context) if self._robot_mask is None else self._robot_mask(self._q(context))
         )
         output.set_value(
             Frame(

@@ -15,6 +15,7 @@ from riseg_drake.segmentation.segment import SegmentParameters, segment
 from riseg_drake.segmentation.segmentation import Segmentation, nothing_segmented
 from riseg_drake.segmentation.untouched import untouched_clusters
 from riseg_drake.systems.stage_clock import timed
+from riseg_drake.systems.value_input import ValueInput
 
 
 class MaskPropagator(LeafSystem):
@@ -55,17 +56,12 @@ class MaskPropagator(LeafSystem):
         super().__init__()
         self.set_name("MaskPropagator")
         self._parameters, self._bfif = parameters or SegmentParameters(), bfif or BFIFParameters()
-        self._pair, *self._stages = (
-            self.DeclareAbstractInputPort(name, AbstractValue.Make(model))
-            for name, model in (
-                ("pair", NO_PAIR),
-                ("expected_flow", NO_FLOW),
-                ("optical_flow", NO_FLOW),
-                ("groups", no_groups()),
-                ("above_table_reference", NOTHING_ABOVE_TABLE),
-                ("above_table", NOTHING_ABOVE_TABLE),
-            )
-        )
+        self._pair = ValueInput(self, "pair", NO_PAIR)
+        self._expected_flow = ValueInput(self, "expected_flow", NO_FLOW)
+        self._optical_flow = ValueInput(self, "optical_flow", NO_FLOW)
+        self._groups = ValueInput(self, "groups", no_groups())
+        self._above_0 = ValueInput(self, "above_table_reference", NOTHING_ABOVE_TABLE)
+        self._above_1 = ValueInput(self, "above_table", NOTHING_ABOVE_TABLE)
         nothing = nothing_segmented(intrinsics.shape)
         self._state = self.DeclareAbstractState(AbstractValue.Make(nothing))
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, offset, self._update)
@@ -89,7 +85,7 @@ class MaskPropagator(LeafSystem):
         return context.get_abstract_state(self._state).get_value()
 
     def _update(self, context: Context, state: State) -> EventStatus:
-        pair: FramePair = self._pair.Eval(context)
+        pair = self._pair.Eval(context)
         if pair is NO_PAIR or pair.current.sequence == self._segmentation(context).sequence:
             return EventStatus.DidNothing()
         self._segment(context, state, pair)
@@ -97,15 +93,14 @@ class MaskPropagator(LeafSystem):
 
     @timed
     def _segment(self, context: Context, state: State, pair: FramePair) -> None:
-        expected_flow, optical_flow, groups, above_0, above_1 = (s.Eval(context) for s in self._stages)
         following = segment(
             self._segmentation(context),
             pair,
-            expected_flow,
-            optical_flow,
-            groups,
-            above_0,
-            above_1,
+            self._expected_flow.Eval(context),
+            self._optical_flow.Eval(context),
+            self._groups.Eval(context),
+            self._above_0.Eval(context),
+            self._above_1.Eval(context),
             self._parameters,
             self._bfif,
         )

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
-from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR, Frame, FramePair, Immutable
+from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR, Frame, Immutable
 from riseg_drake.pushing.push import ArmPhase
 from riseg_drake.systems.memory import replace_memory
+from riseg_drake.systems.value_input import ValueInput
 
 Refinement = Callable[[Frame, NDArray[np.uint16]], NDArray[np.uint16]]
 """Makes of a frame and its mask [H, W] a better mask [H, W] with the same ids. It is called in a thread of its
@@ -76,15 +77,10 @@ class MaskRefiner(LeafSystem):
         self.set_name("MaskRefiner")
         self._refine = refine
         self._worker = ThreadPoolExecutor(1, "MaskRefiner", initializer=_stand_back)
-        self._pair, self._mask, self._phase, self._demand = (
-            self.DeclareAbstractInputPort(name, AbstractValue.Make(model))
-            for name, model in (
-                ("pair", NO_PAIR),
-                ("mask", NO_MASK),
-                ("phase", ArmPhase.OBSERVE),
-                ("demand", _NO_DEMAND),
-            )
-        )
+        self._pair = ValueInput(self, "pair", NO_PAIR)
+        self._mask = ValueInput(self, "mask", NO_MASK)
+        self._phase = ValueInput(self, "phase", ArmPhase.OBSERVE)
+        self._demand = ValueInput(self, "demand", _NO_DEMAND)
         self._memory = self.DeclareAbstractState(AbstractValue.Make(_Memory()))
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, offset, self._update)
         self.DeclareAbstractOutputPort(
@@ -116,7 +112,7 @@ class MaskRefiner(LeafSystem):
         if memory.under_way and memory.under_way[0].done():
             # One an update, so that whoever watches the output misses none.
             memory = replace(memory, refined=memory.under_way[0].result(), under_way=memory.under_way[1:])
-        pair: FramePair = self._pair.Eval(context)
+        pair = self._pair.Eval(context)
         if pair is NO_PAIR:
             return memory
         seen = memory.at_rest

@@ -3,13 +3,14 @@
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, LeafSystem
 
-from riseg_drake.geometry.rgbd import NO_FRAME, Frame
+from riseg_drake.geometry.rgbd import NO_FRAME
 from riseg_drake.segmentation.above_table import (
     NOTHING_ABOVE_TABLE,
     AboveTableParameters,
     objects_above_table,
 )
 from riseg_drake.systems.stage_clock import timed
+from riseg_drake.systems.value_input import ValueInput
 
 
 class ObjectsAboveTable(LeafSystem):
@@ -26,7 +27,7 @@ class ObjectsAboveTable(LeafSystem):
         super().__init__()
         self.set_name("ObjectsAboveTable")
         self._parameters = parameters or AboveTableParameters()
-        self._frame = self.DeclareAbstractInputPort("frame", AbstractValue.Make(NO_FRAME))
+        self._frame = ValueInput(self, "frame", NO_FRAME)
         self.DeclareAbstractOutputPort(
             "above_table",
             AbstractValue.Make(NOTHING_ABOVE_TABLE).Clone,
@@ -36,7 +37,7 @@ class ObjectsAboveTable(LeafSystem):
 
     @timed
     def _calc_above_table(self, context: Context, output: AbstractValue) -> None:
-        frame: Frame = self._frame.Eval(context)
+        frame = self._frame.Eval(context)
         output.set_value(
             NOTHING_ABOVE_TABLE if frame is NO_FRAME else objects_above_table(frame, self._parameters)
         )

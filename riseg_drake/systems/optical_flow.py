@@ -3,10 +3,11 @@
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, LeafSystem
 
-from riseg_drake.geometry.rgbd import NO_PAIR, FramePair
+from riseg_drake.geometry.rgbd import NO_PAIR
 from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
 from riseg_drake.segmentation.optical_flow import NO_FLOW, DisFlow, FlowMethod, flow_around
 from riseg_drake.systems.stage_clock import timed
+from riseg_drake.systems.value_input import ValueInput
 
 
 class OpticalFlow(LeafSystem):
@@ -25,10 +26,8 @@ class OpticalFlow(LeafSystem):
         super().__init__()
         self.set_name("OpticalFlow")
         self._method = method or DisFlow()
-        self._pair, self._above = (
-            self.DeclareAbstractInputPort(name, AbstractValue.Make(model))
-            for name, model in (("pair", NO_PAIR), ("above_table", NOTHING_ABOVE_TABLE))
-        )
+        self._pair = ValueInput(self, "pair", NO_PAIR)
+        self._above = ValueInput(self, "above_table", NOTHING_ABOVE_TABLE)
         self.DeclareAbstractOutputPort(
             "optical_flow",
             AbstractValue.Make(NO_FLOW).Clone,
@@ -38,7 +37,7 @@ class OpticalFlow(LeafSystem):
 
     @timed
     def _calc_optical_flow(self, context: Context, output: AbstractValue) -> None:
-        pair: FramePair = self._pair.Eval(context)
+        pair = self._pair.Eval(context)
         if pair is NO_PAIR:
             output.set_value(NO_FLOW)
         elif self._above.HasValue(context):

@@ -4,12 +4,14 @@ import numpy as np
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, LeafSystem
 
-from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR, FramePair
+from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR
 from riseg_drake.pushing.decision import UNDECIDED
-from riseg_drake.pushing.push_planning import PushPlanningParameters, plan_push
+from riseg_drake.pushing.push_planning import ObjectsAboveTable, PushPlanningParameters, plan_push
+from riseg_drake.pushing.tried_pushes import TriedPush
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
 from riseg_drake.systems.stage_clock import timed
+from riseg_drake.systems.value_input import ValueInput
 
 
 class PushPlanner(LeafSystem):
@@ -17,8 +19,8 @@ class PushPlanner(LeafSystem):
 
     Inputs:
         pair: FramePair; the push is planned in its current frame.
-        above_table: an object with `mask` bool [H, W], `height` float32 [H, W] in m and `plane_W` [4],
-            of the current frame (GetObjsAboveTable).
+        above_table: AboveTable of the current frame (GetObjsAboveTable), or whatever has its `mask`, `height`
+            and `plane_W`.
         mask: L_t of the current frame without the objects in doubt, [H, W].
         position: the arm's commanded joint angles [7], rad; where the path begins and ends.
         tried_pushes: tuple of TriedPush; may be left unconnected.
@@ -44,14 +46,14 @@ class PushPlanner(LeafSystem):
         self._kinematics = kinematics
         self._parameters = parameters or PushPlanningParameters()
         self._seed = seed
-        self._pair = self.DeclareAbstractInputPort("pair", AbstractValue.Make(NO_PAIR))
-        self._above_table = self.DeclareAbstractInputPort(
-            "above_table", AbstractValue.Make(NOTHING_ABOVE_TABLE)
+        self._pair = ValueInput(self, "pair", NO_PAIR)
+        self._above: ValueInput[ObjectsAboveTable] = ValueInput(
+            self, "above_table", NOTHING_ABOVE_TABLE, ObjectsAboveTable
         )
-        self._mask = self.DeclareAbstractInputPort("mask", AbstractValue.Make(NO_MASK))
+        self._mask = ValueInput(self, "mask", NO_MASK)
         self._position = self.DeclareVectorInputPort("position", 7)
-        self._tried = self.DeclareAbstractInputPort("tried_pushes", AbstractValue.Make(()))
-        self._found = self.DeclareAbstractInputPort("found", AbstractValue.Make(NO_MASK))
+        self._tried: ValueInput[tuple[TriedPush, ...]] = ValueInput(self, "tried_pushes", ())
+        self._found = ValueInput(self, "found", NO_MASK)
         self.DeclareAbstractOutputPort(
             "decision",
             alloc=AbstractValue.Make(UNDECIDED).Clone,
@@ -61,17 +63,14 @@ class PushPlanner(LeafSystem):
 
     @timed
     def _calc_decision(self, context: Context, output: AbstractValue) -> None:
-        pair: FramePair = self._pair.Eval(context)
+        pair = self._pair.Eval(context)
         if pair is NO_PAIR:
             output.set_value(UNDECIDED)
             return
-        above_table = self._above_table.Eval(context)
         frame = pair.current
         decision = plan_push(
             frame,
-            above_table.mask,
-            above_table.height,
-            above_table.plane_W,
+            self._above.Eval(context),
             self._mask.Eval(context),
             self._position.Eval(context),
             self._kinematics,

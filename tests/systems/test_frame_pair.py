@@ -1,5 +1,7 @@
 """FramePairMemory: which image goes with which theta, and with which reference."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydrake.common.value import AbstractValue, Value
@@ -10,7 +12,7 @@ from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
 
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import NO_FRAME, NO_PAIR, FramePair
-from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
+from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE, AboveTable
 from riseg_drake.segmentation.frame_pairs import FramePairParameters
 from riseg_drake.systems.frame_pair import FramePairMemory
 from riseg_drake.systems.frame_view import FrameView
@@ -73,8 +75,8 @@ class AboveOfFrame(LeafSystem):
         frame = self.DeclareAbstractInputPort("frame", AbstractValue.Make(NO_FRAME))
         self.DeclareAbstractOutputPort(
             "above_table",
-            AbstractValue.Make(Above()).Clone,
-            lambda context, output: output.set_value(Above(("above", number_in(frame.Eval(context))))),
+            AbstractValue.Make(NOTHING_ABOVE_TABLE).Clone,
+            lambda context, output: output.set_value(above_of(number_in(frame.Eval(context)))),
             {self.all_input_ports_ticket()},
         )
 
@@ -96,10 +98,9 @@ def number_in(frame) -> int | None:
     return None if frame is NO_FRAME else int(frame.color[0, 0, 0])
 
 
-class Above(tuple):
-    """Stands in for what stands on the table, of which only the table is looked at here."""
-
-    plane_W = np.array([0.0, 0.0, 1.0, 0.0])
+def above_of(number: int | None) -> AboveTable:
+    """Says of which frame it would have been."""
+    return replace(NOTHING_ABOVE_TABLE, distance=-1.0 if number is None else float(number))
 
 
 class Loop:
@@ -160,8 +161,8 @@ def test_image_theta_and_objmask_of_a_frame_belong_to_the_same_tick(kind: str, f
             assert frame.depth[0, 0] == 1 + number
             assert frame.time == pytest.approx(number * PERIOD)
             assert frame.sequence == number
-        assert loop.read("above_table") == ("above", number_in(pair.current))
-        assert loop.read("above_table_reference") == ("above", number_in(pair.reference))
+        assert loop.read("above_table").distance == number_in(pair.current)
+        assert loop.read("above_table_reference").distance == number_in(pair.reference)
         assert loop.read("pair_time") == pytest.approx([pair.current.time])
 
 
