@@ -28,13 +28,13 @@ def misfits(
     most: float,
     expected: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Summed squared residuals of the witnesses of N superpixels, and how many cannot be compared, both [N].
+    """Summed squared residuals of the points of N superpixels, and how many cannot be compared, both [N].
 
     What turns is shaded anew, and shadows come and go: a surface becomes darker by one factor and keeps its
     pattern. So the gray values of each superpixel may have changed by a factor, where that is likelier.
 
     Args:
-        pixel: [4, W or more], (u, v, 1, 1 / z) of W witnesses.
+        pixel: [4, W or more], (u, v, 1, 1 / z) of W points.
         gray: [W], their gray values.
         per_variance: [W], 1 / variance of the difference between that and where it should reappear.
         owner: [W], 0..N-1, the superpixel of each.
@@ -44,11 +44,11 @@ def misfits(
         depth_1: [H, W], m; 0 where there is none.
         depth_noise: of the difference of two depths at 1 m, m.
         depth_error: share of depth by which it errs besides.
-        hides: whether what is nearer than expected by as much as counts is something else, before the witness.
+        hides: whether what is nearer than expected by as much as counts is something else, before the point.
         certainty: 1 / variance of the factor, in the measure of a superpixel's squared residuals.
         per_depth: what a squared residual of depth counts beside one of gray.
         most: squared residuals count no more than that.
-        expected: what a witness counts that cannot be compared.
+        expected: what a point counts that cannot be compared.
     """
     total, known, lost = np.zeros(count), np.zeros(count), np.zeros(count)
     before_after, before_before, of_gray = np.zeros(count), np.zeros(count), np.zeros(count)

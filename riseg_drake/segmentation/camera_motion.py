@@ -28,7 +28,7 @@ from riseg_drake.segmentation.noise import MeasurementNoise, flow_sigma
 
 _PLANE_TILT_SIGMA, _PLANE_HEIGHT_SIGMA = 5e-4, 3e-4
 """Standard deviations of a fitted table's tilt, rad, and height, m."""
-_RIM = np.ones((21, 21), np.uint8)
+_BOUNDARY = np.ones((21, 21), np.uint8)
 """So far from an outline, in pixels, flow of one side leaks to the other."""
 _CORRELATED = 9.0
 """Points of flow sampled a dozen pixels apart that are worth one."""
@@ -185,8 +185,8 @@ def _points(
     v, u = np.mgrid[: intrinsics.height, : intrinsics.width][(slice(None), *every)]
     uv_1 = np.stack([u, v], axis=-1) + optical_flow[every].astype(float)
     inside = (uv_1 >= 0).all(-1) & (uv_1[..., 0] < intrinsics.width) & (uv_1[..., 1] < intrinsics.height)
-    rim = cv2.morphologyEx(above_0.mask.astype(np.uint8), cv2.MORPH_GRADIENT, _RIM)[every] > 0
-    good = ~rim & inside & (depth > 0) & ~reference.robot[every] & (sigma < 2 * noise.flow)
+    boundary = cv2.morphologyEx(above_0.mask.astype(np.uint8), cv2.MORPH_GRADIENT, _BOUNDARY)[every] > 0
+    good = ~boundary & inside & (depth > 0) & ~reference.robot[every] & (sigma < 2 * noise.flow)
     p_C0Q = (rays(intrinsics)[every] * depth[..., None])[good].astype(float)
     return p_C0Q, sigma[good].astype(float), ~above_0.mask[every][good], uv_1[good]
 

@@ -88,16 +88,16 @@ class Comparison(Immutable):
 
     @cached_property
     def per_variance(self) -> NDArray:
-        """[W], 1 / variance of the difference between a witness's gray value and where it reappears."""
+        """[W], 1 / variance of the difference between a point's gray value and where it reappears."""
         keyframe = self.keyframe
         return 1 / (keyframe.variance + np.float32(self.shift) ** 2 * keyframe.gradient_squared)
 
     @cached_property
     def leaves(self) -> NDArray[np.float64]:
-        """[N], share of its witnesses that the camera's own motion takes out of the image."""
-        sought = seek(self.keyframe.witnesses, self.X_C1K)
+        """[N], share of its points that the camera's own motion takes out of the image."""
+        sought = seek(self.keyframe.points, self.X_C1K)
         outside = np.flatnonzero(~sought.inside(self.frame.intrinsics.shape))
-        return self.keyframe.share_of_witnesses(outside)
+        return self.keyframe.share_of_points(outside)
 
     @property
     def depth_error(self) -> float:

@@ -21,7 +21,7 @@ from riseg_drake.segmentation.superpixels import (
 )
 from riseg_drake.segmentation.surface import SurfacePixels, surface_pixels
 
-_RIM = np.ones((5, 5), np.uint8)
+_BOUNDARY = np.ones((5, 5), np.uint8)
 """Two pixels on each side of an outline are blurred, interpolated across it, or without true depth."""
 _PINHOLE = np.ones((3, 3), np.uint8)
 """A larger hole in depth is mostly an outline's."""
@@ -53,12 +53,12 @@ class Keyframe(Immutable):
     """Of the region."""
     area: NDArray[np.intp]
     """[N], pixels of each superpixel."""
-    witnesses: SurfacePixels
-    """The pixels that are asked: with depth, not on the rim, every second one; neighbours err alike."""
+    points: SurfacePixels
+    """The pixels that are compared: with depth, not at an occlusion boundary, every second; neighbours err alike."""
     owner: NDArray[np.intp]
-    """[W], superpixel of each witness."""
+    """[W], superpixel of each point."""
     gray: NDArray[np.float32]
-    """[W], of each witness."""
+    """[W], of each point."""
     variance: NDArray[np.float32]
     """[W], of the difference between that and where it should reappear."""
     gradient_squared: NDArray[np.float32]
@@ -84,13 +84,13 @@ class Keyframe(Immutable):
         )
 
     @cached_property
-    def witness_count(self) -> NDArray[np.intp]:
-        """[N], how many witnesses each superpixel has."""
+    def point_count(self) -> NDArray[np.intp]:
+        """[N], how many points each superpixel has."""
         return np.bincount(self.owner, minlength=self.count)
 
-    def share_of_witnesses(self, which: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Of each superpixel's witnesses the share [N] that is among some of them, by their numbers."""
-        return np.bincount(self.owner.take(which), minlength=self.count) / np.maximum(self.witness_count, 1)
+    def share_of_points(self, which: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Of each superpixel's points the share [N] that is among some of them, by their numbers."""
+        return np.bincount(self.owner.take(which), minlength=self.count) / np.maximum(self.point_count, 1)
 
     @cached_property
     def covered(self) -> NDArray[np.bool_]:
@@ -129,10 +129,10 @@ def make_keyframe(
     owner[region] = cut.label
     variance = gray_variance(frame.gradient_squared, noise)
     measured = cv2.morphologyEx((frame.depth > 0).view(np.uint8), cv2.MORPH_CLOSE, _PINHOLE)
-    core = cv2.erode(measured * (owner >= 0).view(np.uint8), _RIM, borderValue=0) > 0
+    core = cv2.erode(measured * (owner >= 0).view(np.uint8), _BOUNDARY, borderValue=0) > 0
     core[::2, ::2] = core[1::2, 1::2] = False
-    witnesses = surface_pixels(core, frame.depth, frame.intrinsics)
-    v, u = witnesses.pixel
+    points = surface_pixels(core, frame.depth, frame.intrinsics)
+    v, u = points.pixel
     return Keyframe(
         frame=frame,
         above=above,
@@ -140,7 +140,7 @@ def make_keyframe(
         height=height,
         superpixels=cut,
         area=np.bincount(cut.label[cut.label >= 0], minlength=cut.count),
-        witnesses=witnesses,
+        points=points,
         owner=owner[v, u],
         gray=frame.gray[v, u],
         variance=variance[v, u],

@@ -34,7 +34,7 @@ class LikelihoodParameters:
     light_view: float = 0.2
     """So much more of it from another view, where gloss shows other lights."""
     correlated_gray: float = 3.0
-    """Errors of gray are alike in about so many witnesses, or six pixels (pose, interpolation); they count as
+    """Errors of gray are alike in about so many points, or six pixels (pose, interpolation); they count as
     one."""
     correlated_depth: float = 14.0
     """The same of depth, whose errors are those of matching windows: half of 4 pi sigma^2, pixels, for noise
@@ -47,7 +47,7 @@ class LikelihoodParameters:
     """So many times that depth may err, and what stands still may seem to have moved, at most: real errors have
     long tails."""
     hidden: float = 1.0
-    """Times the mean squared residual that is usual, by which a hidden witness is worse than one that matches:
+    """Times the mean squared residual that is usual, by which a hidden point is worse than one that matches:
     few things go just where nobody can see them."""
     superpixel_max: float = 4.0
     """Nats that one superpixel may say for a motion against another: its errors are its own."""
@@ -58,9 +58,9 @@ class Costs:
     """Of G motions for N superpixels."""
 
     misfit: NDArray[np.float64]
-    """[G, N], mean squared residuals of each superpixel's witnesses: 2 where a motion is right, 18 at most."""
-    witnesses: NDArray[np.float64]
-    """[N], how many witnesses each superpixel has."""
+    """[G, N], mean squared residuals of each superpixel's points: 2 where a motion is right, 18 at most."""
+    point_count: NDArray[np.float64]
+    """[N], how many points each superpixel has."""
     lost: NDArray[np.float64]
     """[G, N], share of them that cannot be compared, as they are behind the robot or something else, or out of
     the image."""
@@ -70,11 +70,11 @@ class Costs:
     def with_motion(self, other: "Costs") -> "Costs":
         """These and other motions, for the same superpixels."""
         misfit, lost = np.vstack([self.misfit, other.misfit]), np.vstack([self.lost, other.lost])
-        return Costs(misfit, self.witnesses, lost, self.leaves)
+        return Costs(misfit, self.point_count, lost, self.leaves)
 
     @property
     def hidden(self) -> NDArray[np.float64]:
-        """[G, N], share of witnesses that a motion takes where they cannot be compared."""
+        """[G, N], share of points that a motion takes where they cannot be compared."""
         return np.maximum(self.lost - self.leaves, 0)
 
     def excess(self, parameters: LikelihoodParameters) -> NDArray[np.float64]:
@@ -98,10 +98,10 @@ class Costs:
     ) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
         """Mean squared residuals [G, N], what cannot be compared at that which is usual where a motion is
         right, the latter, and nats [N] for each more."""
-        asked = self.witnesses * (1 - self.lost.min(0)) > parameters.correlated_gray
+        asked = self.point_count * (1 - self.lost.min(0)) > parameters.correlated_gray
         level = float(np.median(self.misfit.min(0)[asked])) if asked.any() else EXPECTED
         dispersion = max(1.0, level / EXPECTED)
-        scale = self.witnesses / (2 * parameters.correlated_gray * dispersion)
+        scale = self.point_count / (2 * parameters.correlated_gray * dispersion)
         return self.misfit + self.lost * (level - EXPECTED), level, scale
 
 
@@ -126,7 +126,7 @@ def motion_costs(
         tries = [_misfit(compared, motion, factor, float(light), parameters) for factor in factors]
         misfit[k] = np.min([each for each, _ in tries], axis=0)
         lost[k] = tries[0][1]
-    return Costs(misfit, keyframe.witness_count.astype(float), lost, compared.leaves)
+    return Costs(misfit, keyframe.point_count.astype(float), lost, compared.leaves)
 
 
 def _misfit(
@@ -136,7 +136,7 @@ def _misfit(
     light: float,
     parameters: LikelihoodParameters,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Mean squared residuals [N] of a motion [4, 4], and the share [N] of witnesses that cannot be compared.
+    """Mean squared residuals [N] of a motion [4, 4], and the share [N] of points that cannot be compared.
 
     Depth is really that of both views by a factor, and light changes by a factor of the standard deviation
     `light`.
@@ -145,7 +145,7 @@ def _misfit(
     projection = pixel_projection(compared.X_C1K @ motion_K, frame.intrinsics)
     projection[:, 3] /= depth_factor
     total, lost = misfits(
-        keyframe.witnesses.homogeneous,
+        keyframe.points.homogeneous,
         keyframe.gray,
         compared.per_variance,
         keyframe.owner,
@@ -161,5 +161,5 @@ def _misfit(
         parameters.residual_max,
         EXPECTED,
     )
-    witnesses = np.maximum(keyframe.witness_count, 1)
-    return np.where(keyframe.witness_count > 0, total / witnesses, EXPECTED), lost / witnesses
+    points = np.maximum(keyframe.point_count, 1)
+    return np.where(keyframe.point_count > 0, total / points, EXPECTED), lost / points

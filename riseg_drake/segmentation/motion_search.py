@@ -104,7 +104,7 @@ def search_motions(problem: SearchProblem, proposed_K: NDArray[np.float64]) -> N
     """
     keyframe, parameters, likelihood = problem.compared.keyframe, problem.parameters, problem.likelihood
     search = _Search(problem, np.empty((0, 4, 4)))
-    asked = search.costs.witnesses > likelihood.correlated_gray
+    asked = search.costs.point_count > likelihood.correlated_gray
     tried = np.zeros(keyframe.count, bool)
     for _ in range(parameters.rounds):
         unexplained = (search.costs.misfit.min(0) > parameters.unexplained) & asked
@@ -258,7 +258,7 @@ class _Search:
             own = self._costs(motion)
             results.append((self._gain(own), motion, own))
         # Gains end where noise begins; among those that are alike the patch itself tells.
-        weight = self.costs.witnesses * patch / (2 * self._likelihood.correlated_gray)
+        weight = self.costs.point_count * patch / (2 * self._likelihood.correlated_gray)
         return max(results, key=lambda r: r[0] - float(weight @ r[2].misfit[0]), default=None)
 
     def _differs(self, motion: NDArray, patch: NDArray[np.bool_]) -> bool:
@@ -304,12 +304,12 @@ class _Search:
     def _valleys(self, patch: NDArray[np.bool_], samples: int) -> list[NDArray]:
         """The best motions [4, 4] on the grid of slides and turns."""
         parameters, keyframe = self._parameters, self._keyframe
-        witness = np.flatnonzero(patch[keyframe.owner])
-        if len(witness) < parameters.samples // 3:
+        point = np.flatnonzero(patch[keyframe.owner])
+        if len(point) < parameters.samples // 3:
             return []
-        witness = np.sort(self._rng.permutation(witness)[:samples])
-        v, u = keyframe.witnesses.pixel[:, witness]
-        p_KQ = rays(self._frame.intrinsics)[v, u] * keyframe.witnesses.depth[witness, None]
+        point = np.sort(self._rng.permutation(point)[:samples])
+        v, u = keyframe.points.pixel[:, point]
+        p_KQ = rays(self._frame.intrinsics)[v, u] * keyframe.points.depth[point, None]
         beside = self._beside(patch, p_KQ, samples // 2)
         shifts = np.arange(-parameters.reach, parameters.reach + 1e-9, parameters.step)
         turns = np.arange(-parameters.turn, parameters.turn + 1e-9, parameters.turn_step)

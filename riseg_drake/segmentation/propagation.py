@@ -28,7 +28,7 @@ _DEPTH_AGREES = 0.008
 _REACH = 0.005
 """m; how far from its surroundings a pixel may take its label, where it has none of its own."""
 
-_RIM = np.ones((7, 7), np.uint8)
+_BOUNDARY = np.ones((7, 7), np.uint8)
 """Three pixels on each side of an outline have no depth of their own."""
 
 _CLOSE = 5
@@ -119,7 +119,7 @@ def nearest_label(
     """Give each unlabelled pixel inside [H, W] the label nearest to it, UNKNOWN beyond `reach` pixels.
 
     Objects that come into view, or are put there, must not become part of their neighbours; nor what a thing
-    uncovers that has moved away: what is more than a rim, and at another `depth` [H, W], m.
+    uncovers that has moved away: what is more than a line, and at another `depth` [H, W], m.
     """
     if not inside.any():
         return label
@@ -131,11 +131,11 @@ def nearest_label(
         places, distance = nearest_places(old > 0)
         near = np.flatnonzero(empty & (distance <= reach))
         nearest = places.of(near)
-        broad = cv2.morphologyEx(empty.view(np.uint8), cv2.MORPH_OPEN, _RIM).ravel()[near] > 0
+        broad = cv2.morphologyEx(empty.view(np.uint8), cv2.MORPH_OPEN, _BOUNDARY).ravel()[near] > 0
         if broad.any():
             z = depth[region]
-            # On its own rim a thing has no depth, or that of what is behind it.
-            front = cv2.erode(np.where((old > 0) & (z > 0), z, np.float32(np.inf)), _RIM)
+            # On its own occlusion boundary a thing has no depth, or that of what is behind it.
+            front = cv2.erode(np.where((old > 0) & (z > 0), z, np.float32(np.inf)), _BOUNDARY)
             z_labelled, z = front.ravel()[nearest], z.ravel()[near]
             other = broad & (z > 0) & np.isfinite(z_labelled) & (np.abs(z - z_labelled) > _DEPTH_AGREES)
             near, nearest = near[~other], nearest[~other]

@@ -270,8 +270,8 @@ def _share_in_view(belief: Belief, bodies: Bodies, frame: Frame) -> float:
     """
     keyframe = belief.keyframe
     every = slice(None, None, 1 + len(keyframe.owner) // 2000)
-    v, u = keyframe.witnesses.pixel[:, every]
-    p_KQ = rays(keyframe.frame.intrinsics)[v, u] * keyframe.witnesses.depth[every, None]
+    v, u = keyframe.points.pixel[:, every]
+    p_KQ = rays(keyframe.frame.intrinsics)[v, u] * keyframe.points.depth[every, None]
     motion = bodies.motion[keyframe.owner[every]]
     shown = 0
     for k, X in enumerate(bodies.motions_K):

@@ -59,7 +59,7 @@ def superpixels(
     own = mask & (flooded > 0) & (flooded <= len(v))
     own[v, u] = True
     flooded[v, u] = np.arange(len(v)) + 1
-    # Ridges between basins, and rims that the outside has flooded, go to the nearest piece.
+    # Ridges between basins, and boundaries that the outside has flooded, go to the nearest piece.
     nearest, _ = nearest_values(flooded.astype(np.intp), own)
     label = np.where(mask, nearest, 0) - 1
     return _with_borders(label, len(v))

@@ -108,7 +108,7 @@ def test_depth_costs_its_squared_residual_less_what_is_right(nearer: float, erro
     (-0.1, True, False),  # what is farther does not hide
     (0.1, False, False),
 ])  # fmt: skip
-def test_a_witness_behind_what_is_nearer_cannot_be_compared(nearer: float, hides: bool, hidden: bool) -> None:
+def test_a_point_behind_what_is_nearer_cannot_be_compared(nearer: float, hides: bool, hidden: bool) -> None:
     before = pattern(0)
     depth = np.full((21, 41), 0.5 - nearer, np.float32)
     total, lost = misfits(

@@ -30,13 +30,13 @@ def plate() -> tuple[Keyframe, Frame]:
 
 
 def costs(keyframe: Keyframe, frame: Frame, **parameters: float) -> np.ndarray:
-    """Mean squared residuals of the superpixels that have witnesses."""
+    """Mean squared residuals of the superpixels that have points."""
     compared = Comparison(keyframe, frame, DEPTH_NOISE, view_error=0.01)
     misfit = motion_costs(compared, STILL, LikelihoodParameters(**parameters)).misfit[0]
     return misfit[np.bincount(keyframe.owner, minlength=keyframe.count) > 0]
 
 
-def test_depth_counts_by_how_many_witnesses_its_noise_is_alike_in(plate: tuple[Keyframe, Frame]) -> None:
+def test_depth_counts_by_how_many_points_its_noise_is_alike_in(plate: tuple[Keyframe, Frame]) -> None:
     keyframe, frame = plate
     # Two standard deviations of the difference of two depths: squared residuals of 4.
     nearer = replace(frame, depth=frame.depth - np.float32(2 * np.sqrt(2) * DEPTH_NOISE) * frame.depth**2)
@@ -53,13 +53,13 @@ def test_where_no_depth_is_it_costs_what_a_match_does(plate: tuple[Keyframe, Fra
 def test_light_has_one_price_a_superpixel(plate: tuple[Keyframe, Frame]) -> None:
     keyframe, frame = plate
     brighter = replace(frame, color=np.full_like(frame.color, 132))
-    witnesses = np.bincount(keyframe.owner, minlength=keyframe.count)
-    witnesses = witnesses[witnesses > 0]
+    points = np.bincount(keyframe.owner, minlength=keyframe.count)
+    points = points[points > 0]
     # 120 to 132: minimise n (132 - 120 f)^2 / 8 + c (f - 1)^2 over f, with c = 3 / 0.02^2 where nothing moves.
     c = 3 / 0.02**2
-    f = (witnesses * 120 * 132 / 8 + c) / (witnesses * 120**2 / 8 + c)
+    f = (points * 120 * 132 / 8 + c) / (points * 120**2 / 8 + c)
     # Depth's residual is 0 and its share of a pixel's cost 3 / 14.
-    expected = (132 - 120 * f) ** 2 / 8 / f**2 + c * (f - 1) ** 2 / witnesses + 1 - 3 / 14
+    expected = (132 - 120 * f) ** 2 / 8 / f**2 + c * (f - 1) ** 2 / points + 1 - 3 / 14
     # In the old light it would be 18 a pixel, of which 9 count: for the smallest superpixels that is less.
     np.testing.assert_allclose(costs(keyframe, brighter), np.minimum(expected, 9 + 1 - 3 / 14), rtol=0.02)
 
@@ -85,28 +85,28 @@ def test_a_camera_that_stands_shows_nothing_of_how_depth_errs(plate: tuple[Keyfr
 
 
 def test_nats_are_squared_residuals_by_what_is_usual_and_no_more_than_a_superpixel_may_say() -> None:
-    # 12 witnesses count as 4, half of each squared residual; what is usual is 2, up to 3 may be by chance.
-    misfit, witnesses = np.array([[2.0, 2.0, 3.5], [2.5, 4.0, 2.0]]), np.array([12.0, 12.0, 12.0])
+    # 12 points count as 4, half of each squared residual; what is usual is 2, up to 3 may be by chance.
+    misfit, points = np.array([[2.0, 2.0, 3.5], [2.5, 4.0, 2.0]]), np.array([12.0, 12.0, 12.0])
     seen = np.zeros((2, 3)), np.zeros(3)
-    nats = Costs(misfit, witnesses, *seen).nats(LikelihoodParameters())
+    nats = Costs(misfit, points, *seen).nats(LikelihoodParameters())
     np.testing.assert_allclose(nats, [[0, 0, 0.5 * 2], [0, 1.0 * 2, 0]])
-    twice = Costs(misfit, 100 * witnesses, *seen).nats(LikelihoodParameters())
+    twice = Costs(misfit, 100 * points, *seen).nats(LikelihoodParameters())
     np.testing.assert_allclose(twice, [[0, 0, 4], [0, 4, 0]])
 
 
 def test_excess_is_what_no_motion_explains_beyond_what_may_be_by_chance() -> None:
     # As above, but against a motion that is right; the third is explained by neither, the fourth says too much.
-    misfit, witnesses = np.array([[2.0, 2.0, 5.0, 18.0], [2.5, 4.0, 4.0, 2.0]]), np.full(4, 12.0)
-    excess = Costs(misfit, witnesses, np.zeros((2, 4)), np.zeros(4)).excess(LikelihoodParameters())
+    misfit, points = np.array([[2.0, 2.0, 5.0, 18.0], [2.5, 4.0, 4.0, 2.0]]), np.full(4, 12.0)
+    excess = Costs(misfit, points, np.zeros((2, 4)), np.zeros(4)).excess(LikelihoodParameters())
     np.testing.assert_allclose(excess, [[0, 0, 2.0 * 2, 4], [0, 1.0 * 2, 1.0 * 2, 0]])
 
 
 def test_what_a_motion_hides_is_no_match_but_worse_by_what_is_usual() -> None:
-    # The second motion hides half of it. What is usual is 2: half of that, for 12 witnesses that count as 4.
-    misfit, witnesses = np.array([[2.5], [2.0]]), np.array([12.0])
-    nats = Costs(misfit, witnesses, np.array([[0.0], [0.5]]), np.zeros(1)).nats(LikelihoodParameters())
+    # The second motion hides half of it. What is usual is 2: half of that, for 12 points that count as 4.
+    misfit, points = np.array([[2.5], [2.0]]), np.array([12.0])
+    nats = Costs(misfit, points, np.array([[0.0], [0.5]]), np.zeros(1)).nats(LikelihoodParameters())
     np.testing.assert_allclose(nats, [[0], [0.5 * 2 * 12 / 3 / 2]])
-    without = Costs(misfit, witnesses, np.array([[0.0], [0.5]]), np.zeros(1)).nats(
+    without = Costs(misfit, points, np.array([[0.0], [0.5]]), np.zeros(1)).nats(
         LikelihoodParameters(hidden=0.0)
     )
     np.testing.assert_array_equal(without, [[0], [0]])
@@ -114,12 +114,12 @@ def test_what_a_motion_hides_is_no_match_but_worse_by_what_is_usual() -> None:
 
 def test_what_cannot_be_compared_is_missed_by_no_motion_however_little_noise_there_is() -> None:
     # Three superpixels match with 1.0 where 2 was thought usual; the fourth left the view and counts as 2.
-    misfit, witnesses = np.array([[1.0, 1.0, 1.0, 2.0]]), np.full(4, 12.0)
+    misfit, points = np.array([[1.0, 1.0, 1.0, 2.0]]), np.full(4, 12.0)
     lost = np.array([[0.0, 0.0, 0.0, 1.0]])
-    np.testing.assert_array_equal(Costs(misfit, witnesses, lost, lost[0]).excess(LikelihoodParameters()), 0)
+    np.testing.assert_array_equal(Costs(misfit, points, lost, lost[0]).excess(LikelihoodParameters()), 0)
     # Half of it in view, and that wrong: 0.5 x 2 + 0.5 x 9, where 0.5 x 1 + 0.5 x 9 is meant.
     misfit[0, 3], lost[0, 3] = 5.5, 0.5
-    excess = Costs(misfit, witnesses, lost, lost[0]).excess(LikelihoodParameters(superpixel_max=99.0))
+    excess = Costs(misfit, points, lost, lost[0]).excess(LikelihoodParameters(superpixel_max=99.0))
     np.testing.assert_allclose(excess[0], [0, 0, 0, (5.0 - 1.5) * 12 / 3 / 2])
 
 
@@ -132,7 +132,7 @@ def test_what_hides_itself_from_another_view_is_not_compared_and_from_the_same_v
         compared = Comparison(keyframe, covered, DEPTH_NOISE, view_error=0.01)
         vars(compared)["another_view"] = another
         costs = motion_costs(compared, STILL, LikelihoodParameters())
-        np.testing.assert_array_equal(costs.lost[0][costs.witnesses > 0], lost)
+        np.testing.assert_array_equal(costs.lost[0][costs.point_count > 0], lost)
 
 
 def test_what_is_behind_the_robot_or_outside_the_image_is_hidden(plate: tuple[Keyframe, Frame]) -> None:
@@ -168,9 +168,9 @@ def test_light_is_freer_the_farther_the_view_is_another_one(
     compared = Comparison(keyframe, brighter, DEPTH_NOISE, view_error=0.0)
     vars(compared)["another_view"] = another
     misfit = motion_costs(compared, STILL, LikelihoodParameters()).misfit[0]
-    witnesses = np.bincount(keyframe.owner, minlength=keyframe.count)
+    points = np.bincount(keyframe.owner, minlength=keyframe.count)
     c = 3 / (0.02**2 + (0.2 * another) ** 2)
-    w = witnesses[witnesses > 0]
+    w = points[points > 0]
     f = (w * 120 * 132 / 8 + c) / (w * 120**2 / 8 + c)
     expected = (132 - 120 * f) ** 2 / 8 / f**2 + c * (f - 1) ** 2 / w + 1 - 3 / 14
-    np.testing.assert_allclose(misfit[witnesses > 0], np.minimum(expected, 9 + 1 - 3 / 14), rtol=0.02)
+    np.testing.assert_allclose(misfit[points > 0], np.minimum(expected, 9 + 1 - 3 / 14), rtol=0.02)
