@@ -70,7 +70,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.app.evaluate.scene_pool import PoolError
     from riseg_drake.app.graphics import NoGraphicsError
     from riseg_drake.app.hardware.arm_travel import TravelError
-    from riseg_drake.app.hardware.command import HardwareError
+    from riseg_drake.app.hardware.drivers import HardwareError
     from riseg_drake.app.output_folder import OutputError
     from riseg_drake.app.scenario_file import ScenarioError
     from riseg_drake.app.work_state import RunStoppedError

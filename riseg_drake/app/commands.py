@@ -5,17 +5,19 @@ Commands are imported when they are called: `riseg --help` shall not wait for Dr
 
 import argparse
 import os
+from dataclasses import fields
+from typing import Any, TypeVar
 
 from rich.console import Console
+
+Request = TypeVar("Request")
 
 
 def run(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg run`."""
-    from riseg_drake.app.run.command import run_command
+    from riseg_drake.app.run.command import RunRequest, run_command
 
-    run_command(
-        chosen.scenario, chosen.seed, chosen.output, chosen.record, chosen.meshcat, chosen.overwrite, console
-    )
+    run_command(_request(RunRequest, chosen), console)
 
 
 def evaluate(chosen: argparse.Namespace, console: Console) -> None:
@@ -33,34 +35,12 @@ def evaluate(chosen: argparse.Namespace, console: Console) -> None:
             chosen.seed, chosen.recordings, chosen.output, chosen.scenario, chosen.overwrite, console
         )
     if chosen.suite is not None:
-        from riseg_drake.app.evaluate.suite import suite_command
+        from riseg_drake.app.evaluate.suite import SuiteRequest, suite_command
 
-        return suite_command(
-            chosen.suite,
-            chosen.scenes,
-            chosen.seed,
-            chosen.jobs,
-            chosen.output,
-            chosen.dask,
-            chosen.overwrite,
-            console,
-        )
-    from riseg_drake.app.evaluate.command import evaluate_command
+        return suite_command(_request(SuiteRequest, chosen), console)
+    from riseg_drake.app.evaluate.command import EvaluationRequest, evaluate_command
 
-    evaluate_command(
-        chosen.scenes or 20,
-        chosen.seed,
-        chosen.objects,
-        chosen.jobs,
-        chosen.output,
-        chosen.scenario,
-        chosen.dask,
-        chosen.ablation,
-        chosen.baseline,
-        chosen.masks,
-        chosen.overwrite,
-        console,
-    )
+    evaluate_command(_request(EvaluationRequest, chosen), console)
 
 
 def _evaluation_of(suite: str | None) -> tuple[str, list[str]]:
@@ -77,20 +57,9 @@ def hardware(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg hardware`."""
     # Threads that wait for each other busily take the processor from the drivers and from the commands.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    from riseg_drake.app.hardware.command import hardware_command
+    from riseg_drake.app.hardware.command import HardwareRequest, hardware_command
 
-    hardware_command(
-        chosen.scenario,
-        chosen.seed,
-        chosen.output,
-        chosen.record,
-        chosen.meshcat,
-        chosen.dry_run,
-        chosen.yes,
-        chosen.truth,
-        chosen.replayed,
-        console,
-    )
+    hardware_command(_request(HardwareRequest, chosen), console)
 
 
 def hand_eye(chosen: argparse.Namespace, console: Console) -> None:
@@ -114,20 +83,7 @@ def segment(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg segment`."""
     from riseg_drake.app.segment.command import SegmentRequest, segment_command
 
-    segment_command(
-        SegmentRequest(
-            recording=chosen.recording,
-            output=chosen.output,
-            scenario=chosen.scenario,
-            seed=chosen.seed,
-            robot=chosen.robot,
-            camera_frame=chosen.camera_frame,
-            stamp_limit=chosen.stamp_limit,
-            follow=chosen.follow,
-            overwrite=chosen.overwrite,
-        ),
-        console,
-    )
+    segment_command(_request(SegmentRequest, chosen), console)
 
 
 def score(chosen: argparse.Namespace, console: Console) -> None:
@@ -164,3 +120,10 @@ def pictures(chosen: argparse.Namespace, console: Console) -> None:
     from riseg_drake.app.show.command import pictures_command
 
     pictures_command(chosen.scenario, chosen.seed, chosen.output, chosen.evaluation, chosen.overwrite, console)
+
+
+def _request(kind: type[Request], chosen: argparse.Namespace) -> Request:
+    """What was chosen, as a command's dataclass has it: the options have its fields' names."""
+    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
+    values: dict[str, Any] = {name: getattr(chosen, name) for name in names}
+    return kind(**{name: value for name, value in values.items() if value is not None})

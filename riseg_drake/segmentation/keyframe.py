@@ -54,7 +54,7 @@ class Keyframe(Immutable):
     area: NDArray[np.intp]
     """[N], pixels of each superpixel."""
     points: SurfacePixels
-    """The pixels that are compared: with depth, not at an occlusion boundary, every second; neighbours err alike."""
+    """What is compared: pixels with depth, not at an occlusion boundary, every second; neighbours err alike."""
     owner: NDArray[np.intp]
     """[W], superpixel of each point."""
     gray: NDArray[np.float32]

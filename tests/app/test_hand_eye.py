@@ -5,7 +5,7 @@ import pytest
 from pydrake.lcm import DrakeLcm
 
 from riseg_drake.app.cli import main
-from riseg_drake.app.hardware.command import HardwareError
+from riseg_drake.app.hardware.drivers import HardwareError
 from riseg_drake.app.hardware.hand_eye import _Collector, _postures
 from riseg_drake.app.output_folder import SUMMARY
 from riseg_drake.app.scenario import HARDWARE, load_scenario

@@ -10,7 +10,7 @@ from riseg_drake.app.bench.stream import is_even
 from riseg_drake.app.cli import main
 from riseg_drake.app.diagram import make_diagram
 from riseg_drake.app.hardware.arm_travel import TravelError, WayBack, straight_motion
-from riseg_drake.app.hardware.command import HardwareError, wait_for_drivers
+from riseg_drake.app.hardware.drivers import HardwareError, wait_for_drivers
 from riseg_drake.app.output import RunFolder
 from riseg_drake.app.output_folder import SUMMARY
 from riseg_drake.app.planned_speed import check_limits, planned_limits, push_parameters

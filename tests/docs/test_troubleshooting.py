@@ -13,7 +13,7 @@ import pytest
 from drake import lcmt_image_array, lcmt_panda_status
 
 from riseg_drake.app.cli import main
-from riseg_drake.app.hardware.command import PATIENCE, HardwareError, wait_for_drivers
+from riseg_drake.app.hardware.drivers import PATIENCE, HardwareError, wait_for_drivers
 from riseg_drake.app.output import RunFolder
 from riseg_drake.app.scenario import HARDWARE, Scenario, load_scenario
 from riseg_drake.app.segment.replay import Replay

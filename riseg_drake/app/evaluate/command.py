@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -37,46 +37,53 @@ class EvaluationError(ValueError):
     """Why an evaluation says nothing, in one line."""
 
 
-def evaluate_command(
-    scenes: int,
-    seed: int,
-    objects: Path | None,
-    jobs: int,
-    output: Path | None,
-    scenario_file: Path | None,
-    dask: str | None,
-    ablation: bool,
-    baseline: str | None,
-    masks: Sequence[str],
-    overwrite: bool,
-    console: Console,
-) -> None:
+@dataclass(frozen=True)
+class EvaluationRequest:
+    """What is to be evaluated, and how."""
+
+    scenes: int = 20
+    seed: int = 0
+    """Of the first scene; the others follow."""
+    objects: Path | None = None
+    """A folder of models to draw from, or None for the scenario's."""
+    jobs: int = 1
+    """Scenes at a time."""
+    dask: str | None = None
+    """Address of a Dask scheduler that does them, or None."""
+    output: Path | None = None
+    """Folder (out/evaluate_NAME_seed_S)."""
+    scenario: Path | None = None
+    """A file, or None for the built-in one."""
+    ablation: bool = False
+    """Whether each recording is segmented again with parts of the algorithm switched off."""
+    baseline: str | None = None
+    """`sam`, or None."""
+    masks: Sequence[str] = ()
+    """NAME=FOLDER of masks that other methods made of the same pictures."""
+    overwrite: bool = False
+    """Whether an earlier evaluation there is removed first."""
+
+
+def evaluate_command(request: EvaluationRequest, console: Console) -> None:
     """Run what is missing of an evaluation, then write its report.
 
     Raises EvaluationError where every scene failed, and OutputError for a folder that holds something else.
     """
-    scenario = load_scenario(scenario_file)
-    if objects is not None:
-        scenario.simulated.scene.objects = [str(objects.resolve())]
+    scenario = load_scenario(request.scenario)
+    if request.objects is not None:
+        scenario.simulated.scene.objects = [str(request.objects.resolve())]
     if not scenario.simulated.scene.placed:  # says it if there are none
         find_models(scenario.simulated.scene.objects, scenario.simulated.scene.names)
-    name = scenario_name(scenario_file)
-    if baseline == "sam":
+    name = scenario_name(request.scenario)
+    sam = request.baseline == "sam"
+    if sam:
         _require_sam(scenario)
-    tasks = scene_tasks(
-        scenario,
-        name,
-        output or Path("out") / f"evaluate_{name}_seed_{seed}",
-        scenes,
-        seed,
-        ablation,
-        sam=baseline == "sam",
-    )
-    given = parse_given_masks(masks, taken=(OURS, *tasks[0].baselines))
-    folder = tasks[0].folder.parent
-    pool = pool_for(jobs, dask)
+    folder = request.output or Path("out") / f"evaluate_{name}_seed_{request.seed}"
+    tasks = scene_tasks(scenario, name, folder, request.scenes, request.seed, request.ablation, sam)
+    given = parse_given_masks(request.masks, taken=(OURS, *tasks[0].baselines))
+    pool = pool_for(request.jobs, request.dask)
     last_step = scenario.arm.most_interactions
-    results = evaluate(tasks, pool, last_step, console, given, overwrite)
+    results = evaluate(tasks, pool, last_step, console, given, request.overwrite)
     _print_scores(results, last_step, console)
     console.print(f"report in {folder / REPORT}")
     failures = [result.failure for result in results if result.failure]

@@ -52,22 +52,33 @@ class Kind:
         return re.sub(r"^\d+_", "", self.folder).replace("_", " ")
 
 
-def suite_command(
-    suite: str,
-    scenes: int | None,
-    seed: int,
-    jobs: int,
-    output: Path | None,
-    dask: str | None,
-    overwrite: bool,
-    console: Console,
-) -> None:
+@dataclass(frozen=True)
+class SuiteRequest:
+    """Which suite is to be run, and how."""
+
+    suite: str
+    """The name of a built-in one, or a folder of scenarios."""
+    scenes: int = SCENES
+    """Of each kind."""
+    seed: int = 0
+    """Of the first scene of each kind; the others follow."""
+    jobs: int = 1
+    """Scenes at a time."""
+    dask: str | None = None
+    """Address of a Dask scheduler that does them, or None."""
+    output: Path | None = None
+    """Folder (out/suite_NAME_seed_S)."""
+    overwrite: bool = False
+    """Whether an earlier run there is removed first."""
+
+
+def suite_command(request: SuiteRequest, console: Console) -> None:
     """Run what is missing of a suite, then write its table. Raises EvaluationError where every scene failed."""
-    kinds = find_suite(suite)
-    folder = output or Path("out") / f"suite_{Path(suite).name}_seed_{seed}"
-    tasks = {kind: kind_tasks(kind, folder, scenes or SCENES, seed) for kind in kinds}
-    pool = pool_for(jobs, dask)
-    results = evaluate_suite(tasks, folder, pool, console, overwrite)
+    kinds = find_suite(request.suite)
+    folder = request.output or Path("out") / f"suite_{Path(request.suite).name}_seed_{request.seed}"
+    tasks = {kind: kind_tasks(kind, folder, request.scenes, request.seed) for kind in kinds}
+    pool = pool_for(request.jobs, request.dask)
+    results = evaluate_suite(tasks, folder, pool, console, request.overwrite)
     rows = [(each.name, step_means([s.scores for s in each.scenes], each.last_step)[-1]) for each in results]
     console.print("\nafter the last interaction, means over the scenes of each kind, in percent")
     console.print(score_table(rows, first="\nkind"))

@@ -1,12 +1,12 @@
 """`riseg hardware`: the same diagram on a real robot, at wall time, with an operator."""
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from drake import lcmt_panda_status
 from pydrake.geometry import Meshcat, StartMeshcat
 from pydrake.systems.framework import Context
 from pydrake.trajectories import PiecewisePolynomial
@@ -15,6 +15,7 @@ from rich.console import Console
 from riseg_drake.app.diagram import Drivers, WiredDiagram, make_diagram
 from riseg_drake.app.hardware.arm_travel import ARRIVED, WayBack, straight_motion, travel
 from riseg_drake.app.hardware.arm_watch import ArmWatch
+from riseg_drake.app.hardware.drivers import PATIENCE, listening, wait_for_drivers
 from riseg_drake.app.hardware.dry_run import DryRun
 from riseg_drake.app.hardware.terminal_operator import TerminalOperator
 from riseg_drake.app.output import RECORDING, RunFolder, Step
@@ -22,67 +23,56 @@ from riseg_drake.app.planned_speed import check_limits, planned_limits
 from riseg_drake.app.run.command import Narrator, report, state_of
 from riseg_drake.app.run.interactions import Listener, Progress, TruthSource, WallClock, interactions
 from riseg_drake.app.run.recording import recording_of
-from riseg_drake.app.run.truth_reception import TruthReception
 from riseg_drake.app.scenario import HARDWARE, Scenario, load_scenario, scenario_name
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.work_state import RunStoppedError
 from riseg_drake.pushing.push import Push
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture
-from riseg_drake.robot.supervisor import MOVE
 from riseg_drake.stations.command_process import CommandProcess
-from riseg_drake.stations.hardware import HardwareStationConfig
-from riseg_drake.stations.lcm_channels import open_lcm, receive_buffer_warning
-from riseg_drake.stations.lcm_images import ImageError, decode_images
+from riseg_drake.stations.lcm_channels import receive_buffer_warning
 from riseg_drake.stations.lcm_reception import Reception
 from riseg_drake.systems.arm_motion import Permission
 from riseg_drake.systems.stage_clock import StageClock
 
-PATIENCE = 20.0
-"""Arm and camera must have been heard after this time, s."""
-ENDED = 1.0
-"""The arm's status has ended when the newest is older than this, s."""
 SILENCE = 5.0
 """A replayed log is over when nothing has come for this long, s."""
 
 
-class HardwareError(RuntimeError):
-    """Arm or camera are not there; says in one line what is missing."""
+@dataclass(frozen=True)
+class HardwareRequest:
+    """What is to be done with the real arm, or shown of what it would do."""
+
+    scenario: Path | None = None
+    """A file, or None for the built-in one."""
+    seed: int = 0
+    output: Path | None = None
+    """Folder (out/NAME_DATE)."""
+    record: bool = False
+    """Whether what the camera sees is recorded."""
+    meshcat: bool = False
+    """Whether it is shown in a browser; a dry run always is."""
+    dry_run: bool = False
+    """Whether nothing moves."""
+    yes: bool = False
+    """Whether nobody is asked before a motion."""
+    truth: bool = False
+    """Whether the emulator's true labels are heard."""
+    replayed: bool = False
+    """Whether a log is heard in place of drivers; then nothing moves."""
 
 
-_MODES = {
-    lcmt_panda_status.kOther: "other",
-    lcmt_panda_status.kIdle: "idle: is the driver started with --control_mode=position or velocity?",
-    lcmt_panda_status.kGuiding: "guided by hand: let go of the guiding buttons",
-    lcmt_panda_status.kReflex: "reflex: unlock the robot in Desk and start the driver again",
-    lcmt_panda_status.kUserStopped: "user stopped: release the user stop and start the driver again",
-    lcmt_panda_status.kAutomaticErrorRecovery: "recovering from an error",
-}
-"""What a person does about each `robot_mode` in which the arm takes no commands."""
-
-
-def hardware_command(
-    scenario_file: Path | None,
-    seed: int,
-    output: Path | None,
-    record: bool,
-    meshcat: bool,
-    dry_run: bool,
-    yes: bool,
-    truth: bool,
-    replayed: bool,
-    console: Console,
-) -> None:
+def hardware_command(request: HardwareRequest, console: Console) -> None:
     """Run the diagram against arm and camera until it is done, and say how it went."""
-    scenario = load_scenario(scenario_file, HARDWARE)
+    scenario = load_scenario(request.scenario, HARDWARE)
     config = scenario.hardware
     check_limits(scenario)
     warning = receive_buffer_warning(config.lcm.url)
     if warning:
         console.print(warning, style="yellow")
-    name = scenario_name(scenario_file, HARDWARE)
-    dry_run = dry_run or replayed
+    name = scenario_name(request.scenario, HARDWARE)
+    seed, dry_run = request.seed, request.dry_run or request.replayed
     folder = RunFolder(
-        output or Path("out") / f"{name}_{time.strftime('%Y%m%d_%H%M%S')}",
+        request.output or Path("out") / f"{name}_{time.strftime('%Y%m%d_%H%M%S')}",
         {"scenario": name, "seed": seed, "dry_run": dry_run},
         command="hardware",
     )
@@ -92,91 +82,24 @@ def hardware_command(
         try:
             with (
                 state_of(folder, progress, steps),
-                listening(config, replayed, truth) as (reception, truth_source),
+                listening(config, request.replayed, request.truth) as (reception, truth_source),
             ):
                 console.print(f"{name}, results in {folder.path}")
-                browser = StartMeshcat() if meshcat or dry_run else None
+                browser = StartMeshcat() if request.meshcat or dry_run else None
                 with console.status("waiting for arm and camera") as status:
                     wait_for_drivers(reception, config, ready=not dry_run, say=status.update)
-                operator = TerminalOperator(console, yes)
+                operator = TerminalOperator(console, request.yes)
                 session = _Session(
                     scenario, seed, folder, progress, steps, reception, truth_source, operator, console, browser
                 )
                 if dry_run:
-                    session.run_dry(yes, replayed)
+                    session.run_dry(request.yes, request.replayed)
                 else:
-                    session.run(record)
+                    session.run(request.record)
         except RunStoppedError:
             report(steps, console)
             raise
     report(steps, console)
-
-
-@contextmanager
-def listening(
-    config: HardwareStationConfig, replayed: bool, truth: bool
-) -> Iterator[tuple[Reception, TruthSource]]:
-    """Hear arm and camera, and the emulator's truth if asked, for the time of a `with`."""
-    lcm = open_lcm(config.lcm)
-    reception = Reception(lcm, config.lcm, replayed)
-    source: TruthSource = lambda frame, context: None  # noqa: E731
-    if truth:
-        source = TruthReception(lcm, config.camera.first_column, lambda: reception.offset)
-    reception.start()
-    try:
-        yield reception, source
-    finally:
-        reception.stop()
-
-
-def wait_for_drivers(
-    reception: Reception,
-    config: HardwareStationConfig,
-    patience: float = PATIENCE,
-    *,
-    ready: bool = False,
-    say: Callable[[str], None] = lambda text: None,
-) -> None:
-    """Return when both have been heard, and, where it must be `ready`, the arm takes commands.
-
-    `say` is told what is waited for. Raises HardwareError after `patience`, s, and ImageError where no picture
-    is of the right kind.
-    """
-    deadline = time.monotonic() + patience
-    while problem := _what_is_missing(reception, config, ready):
-        say(f"waiting: {problem}")
-        if time.monotonic() >= deadline:
-            left_out = "".join(f"; {line}" for line in reception.untold())
-            raise HardwareError(f"{problem} within {patience:g} s at {config.lcm.url}{left_out}")
-        time.sleep(0.02)
-
-
-def _what_is_missing(reception: Reception, config: HardwareStationConfig, ready: bool) -> str:
-    """What keeps a run from beginning; empty if nothing does. Raises ImageError."""
-    silent = []
-    if reception.status is None:
-        silent.append(f"{config.lcm.status_channel} (is drake-franka-driver running?)")
-    if not reception.pictures:
-        silent.append(f"{config.lcm.image_channel} (is realsense_rgbd_publisher running, with that serial?)")
-    if silent:
-        return f"nothing came on {' nor on '.join(silent)}"
-    status = reception.status
-    assert status is not None
-    if ready and reception.clock() - status.time > ENDED:
-        return f"{config.lcm.status_channel} has ended (start drake-franka-driver again), and nothing more came"
-    if ready and status.robot_mode != MOVE:
-        return f"robot_mode is {status.robot_mode} ({_MODES[status.robot_mode]}), and did not change"
-    newest = reception.newest_picture(after=-np.inf)
-    if newest is None:
-        return "no picture came that can be used"
-    sent, message = newest
-    try:
-        decode_images(message, (config.camera.full_width, config.camera.full_height))
-    except ImageError as error:
-        reception.skip(sent, error)
-        return "no picture came that can be used"
-    reception.used()
-    return ""
 
 
 class _Session:

@@ -11,7 +11,7 @@ from pydrake.trajectories import PiecewisePolynomial
 from rich.console import Console
 
 from riseg_drake.app.hardware.arm_travel import straight_motion, travel
-from riseg_drake.app.hardware.command import HardwareError, listening, wait_for_drivers
+from riseg_drake.app.hardware.drivers import HardwareError, listening, wait_for_drivers
 from riseg_drake.app.hardware.terminal_operator import TerminalOperator
 from riseg_drake.app.output_folder import OutputFolder
 from riseg_drake.app.planned_speed import check_limits, planned_limits

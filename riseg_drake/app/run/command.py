@@ -4,7 +4,7 @@ import resource
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -30,26 +30,35 @@ from riseg_drake.systems.mask_refiner import NO_REFINED_MASK, RefinedMask
 from riseg_drake.systems.stage_clock import StageClock
 
 
-def run_command(
-    scenario_file: Path | None,
-    seed: int,
-    output: Path | None,
-    record: bool,
-    meshcat: bool,
-    overwrite: bool,
-    console: Console,
-) -> None:
+@dataclass(frozen=True)
+class RunRequest:
+    """Which scene is to be run, and what is to be seen of it."""
+
+    scenario: Path | None = None
+    """A file, or None for the built-in one."""
+    seed: int = 0
+    output: Path | None = None
+    """Folder (out/NAME_seed_S)."""
+    record: bool = False
+    """Whether what the camera sees is recorded."""
+    meshcat: bool = False
+    """Whether it is shown in a browser."""
+    overwrite: bool = False
+    """Whether an earlier run there is removed first."""
+
+
+def run_command(request: RunRequest, console: Console) -> None:
     """Run one scene, tell how it goes, and show the scores of every interaction."""
-    scenario = load_scenario(scenario_file)
+    scenario, seed = load_scenario(request.scenario), request.seed
     _ = scenario.simulated  # says so where it is not
     require_graphics()
-    name = scenario_name(scenario_file)
-    path, about = output or Path("out") / f"{name}_seed_{seed}", {"scenario": name, "seed": seed}
-    with RunFolder(path, about, overwrite=overwrite) as folder:
+    name = scenario_name(request.scenario)
+    path, about = request.output or Path("out") / f"{name}_seed_{seed}", {"scenario": name, "seed": seed}
+    with RunFolder(path, about, overwrite=request.overwrite) as folder:
         console.print(f"{name}, seed {seed}, results in {folder.path}")
-        browser = StartMeshcat() if meshcat else None
+        browser = StartMeshcat() if request.meshcat else None
         with console.status("placing the objects") as status:
-            steps = run(scenario, seed, folder, record, browser, Narrator(console, status))
+            steps = run(scenario, seed, folder, request.record, browser, Narrator(console, status))
     report(steps, console)
 
 
