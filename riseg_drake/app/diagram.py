@@ -26,8 +26,9 @@ from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.segmentation_block import STATION_PORTS, add_segmentation
 from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.pushing.arm_path import ArmPhase
 from riseg_drake.pushing.decision import Decision
-from riseg_drake.pushing.push import ArmPhase, Push
+from riseg_drake.pushing.push import Push
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture
 from riseg_drake.segmentation.segmentation import Segmentation
 from riseg_drake.stations.hardware import HardwareStation, TargetSink

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.pushing.arm_path import PushPath
 from riseg_drake.pushing.boundary import BoundaryParameters, boundary
 from riseg_drake.pushing.clusters import Cluster, ClustersParameters, find_clusters
 from riseg_drake.pushing.contact import find_contacts
@@ -17,7 +18,6 @@ from riseg_drake.pushing.gain import GainParameters, expected_gain
 from riseg_drake.pushing.levels import LevelsParameters, raised
 from riseg_drake.pushing.objects_to_segment import ObjectsToSegmentParameters, things_to_push
 from riseg_drake.pushing.push import NO_PUSH, Push
-from riseg_drake.pushing.push_path import PushPath
 from riseg_drake.pushing.pusher import Pusher
 from riseg_drake.pushing.table_map import TableMap, TableMapParameters
 from riseg_drake.pushing.tried_pushes import TriedPush, times_pushed

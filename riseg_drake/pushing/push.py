@@ -1,31 +1,12 @@
 """The paper's action a_i: one push."""
 
 from dataclasses import dataclass, field
-from enum import Enum
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.rgbd import Immutable
-
-if TYPE_CHECKING:
-    from riseg_drake.pushing.push_path import PushPath
-
-
-class ArmPhase(Enum):
-    """What the arm is doing."""
-
-    OBSERVE = "observe"
-    """At rest at the observation posture."""
-    APPROACH = "approach"
-    """From there to where the pusher is lowered behind the object."""
-    PUSH = "push"
-    """Forward: up to the contact and d_push beyond it."""
-    RETREAT = "retreat"
-    """Back a little, up, and to the observation posture."""
-    DONE = "done"
-    """At rest for good: there is nothing more to push."""
+from riseg_drake.pushing.arm_path import PushPath
 
 
 @dataclass(frozen=True)
@@ -53,7 +34,7 @@ class Push(Immutable):
     """Height of the tallest object, m, above what `tip_height` is told from: the pusher crosses above it."""
     cost: float
     """What is lost of one object: less the more objects the push can be expected to settle."""
-    path: "PushPath | None" = field(default=None, repr=False)
+    path: PushPath | None = field(default=None, repr=False)
     """The arm's way there and back; None until it has been planned."""
 
 

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from pydrake.trajectories import PiecewisePolynomial
 from scipy.spatial.transform import Rotation
 
+from riseg_drake.pushing.arm_path import PushPath
 from riseg_drake.pushing.decision import PathStage
-from riseg_drake.pushing.push import ArmPhase, Push
+from riseg_drake.pushing.push import Push
 from riseg_drake.pushing.pusher import Pusher
 from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest, steady_speed
 from riseg_drake.robot.kinematics import (
@@ -76,34 +77,6 @@ class PushPathParameters:
     min_clearance: float = MIN_CLEARANCE
     """Room that arm, pusher and camera keep to the table and to each other, m; half the tip's height where that
     is less, so that low things can be pushed."""
-
-
-@dataclass(frozen=True)
-class PushPath:
-    """Joint angles over time, from rest at the observation posture to rest there again."""
-
-    trajectory: PiecewisePolynomial
-    """[7], rad, over [0, duration] s; velocity and acceleration are continuous."""
-    push_start: float
-    """When the tip, lowered behind the object, starts to move forward, s."""
-    push_end: float
-    """When it is d_push beyond the contact, s."""
-
-    @property
-    def duration(self) -> float:
-        """Of the whole interaction, s."""
-        return float(self.trajectory.end_time())
-
-    def position(self, time: float) -> NDArray[np.float64]:
-        """Joint angles [7] at a time since the start; the end's beyond it."""
-        clamped = min(max(time, 0.0), self.duration)
-        return self.trajectory.value(clamped)[:, 0]
-
-    def phase(self, time: float) -> ArmPhase:
-        """What the arm does at a time since the start, s."""
-        if time < self.push_start:
-            return ArmPhase.APPROACH
-        return ArmPhase.PUSH if time < self.push_end else ArmPhase.RETREAT
 
 
 def plan_push_path(

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.pushing.arm_path import PushPath
 from riseg_drake.pushing.decision import Decision, PathStage
 from riseg_drake.pushing.find_action import FindActionParameters, find_action
 from riseg_drake.pushing.push import Push
-from riseg_drake.pushing.push_path import PushPath, PushPathParameters, plan_push_path
+from riseg_drake.pushing.push_path import PushPathParameters, plan_push_path
 from riseg_drake.pushing.table_map import map_table
 from riseg_drake.pushing.tried_pushes import TriedPush
 from riseg_drake.robot.kinematics import PandaKinematics

@@ -10,14 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import Intrinsics, bounding_region
-from riseg_drake.geometry.plane import (
-    PlaneFitParameters,
-    fit_plane,
-    heights_above_plane,
-    transform_plane,
-)
+from riseg_drake.geometry.plane import heights_above_plane, transform_plane
 from riseg_drake.geometry.rgbd import Frame, Immutable
 from riseg_drake.segmentation.table_extent import TableExtentParameters, on_this_table
+from riseg_drake.segmentation.table_plane import PlaneFitParameters, fit_plane
 
 _DEPTH_NOISE_MIN = 2.0e-4
 """m at 1 m; a rendered depth without noise is taken for no better than that: pixels still are of some size."""

@@ -12,8 +12,9 @@ from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSys
 from pydrake.trajectories import PiecewisePolynomial
 
 from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR, FramePair, Immutable
+from riseg_drake.pushing.arm_path import ArmPhase
 from riseg_drake.pushing.decision import UNDECIDED, Decision, Ending
-from riseg_drake.pushing.push import NO_PUSH, ArmPhase, Push
+from riseg_drake.pushing.push import NO_PUSH, Push
 from riseg_drake.pushing.time_law import minimum_jerk
 from riseg_drake.pushing.tried_pushes import SegmentedSoFar, TriedPush, segmented_so_far
 from riseg_drake.systems.memory import replace_memory

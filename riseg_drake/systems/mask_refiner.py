@@ -13,7 +13,7 @@ from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
 from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR, Frame, Immutable
-from riseg_drake.pushing.push import ArmPhase
+from riseg_drake.pushing.arm_path import ArmPhase
 from riseg_drake.systems.memory import replace_memory
 from riseg_drake.systems.value_input import ValueInput
 

@@ -6,7 +6,8 @@ from riseg_drake.app.hardware import arm_watch
 from riseg_drake.app.hardware.arm_travel import TravelError
 from riseg_drake.app.hardware.arm_watch import CONTACT_MARGIN, ArmWatch
 from riseg_drake.app.run.interactions import Progress
-from riseg_drake.pushing.push import NO_PUSH, ArmPhase
+from riseg_drake.pushing.arm_path import ArmPhase
+from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.robot.supervisor import Cause, Mode, SafetyState
 
 HERE = object()

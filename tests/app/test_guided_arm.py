@@ -12,7 +12,7 @@ from riseg_drake.app.hardware import arm_travel, arm_watch
 from riseg_drake.app.hardware.arm_travel import TravelError, WayBack, straight_motion, travel
 from riseg_drake.app.hardware.arm_watch import ArmWatch
 from riseg_drake.app.run.interactions import Progress
-from riseg_drake.pushing.push import ArmPhase
+from riseg_drake.pushing.arm_path import ArmPhase
 from riseg_drake.pushing.time_law import SpeedLimits
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.stations.hardware import Targets

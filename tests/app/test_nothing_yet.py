@@ -20,7 +20,8 @@ from riseg_drake.app import refinement_block
 from riseg_drake.app.diagram import Drivers, make_diagram
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.app.segmentation_block import make_segmentation, panda_view
-from riseg_drake.pushing.push import NO_PUSH, ArmPhase
+from riseg_drake.pushing.arm_path import ArmPhase
+from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.robot.kinematics import READY, PandaKinematics
 from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.ideal_arm import status_message

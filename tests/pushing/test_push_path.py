@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from riseg_drake.pushing.arm_path import ArmPhase, PushPath
 from riseg_drake.pushing.decision import PathStage
 from riseg_drake.pushing.find_action import find_action
-from riseg_drake.pushing.push import NO_PUSH, ArmPhase
-from riseg_drake.pushing.push_path import PushPath, PushPathParameters, plan_push_path
+from riseg_drake.pushing.push import NO_PUSH
+from riseg_drake.pushing.push_path import PushPathParameters, plan_push_path
 from riseg_drake.pushing.pusher import Pusher
 from riseg_drake.robot.kinematics import observation_posture, observe_pose
 from riseg_drake.robot.limits import PANDA_LIMITS

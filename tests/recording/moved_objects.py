@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from riseg_drake.geometry.camera import Intrinsics, project, rays
-from riseg_drake.geometry.plane import fit_plane
 from riseg_drake.geometry.se3 import exp_se3, inverse, move_points, translation
 from riseg_drake.recording.layout import RecordedFrame
+from riseg_drake.segmentation.table_plane import fit_plane
 
 
 def moved_film(

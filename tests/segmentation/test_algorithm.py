@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from riseg_drake.geometry.plane import NoPlaneError
 from riseg_drake.segmentation.algorithm import SegmentObjsParameters, no_frame_segmented, segment_objs
 from riseg_drake.segmentation.optical_flow import DisFlow
+from riseg_drake.segmentation.table_plane import NoPlaneError
 from tests.segmentation.drawn_scene import CAMERA, DrawnScene, looking_down, planar
 
 

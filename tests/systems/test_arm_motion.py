@@ -11,9 +11,9 @@ from pydrake.systems.primitives import VectorLogSink
 
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR, Frame, FramePair
+from riseg_drake.pushing.arm_path import ArmPhase, PushPath
 from riseg_drake.pushing.decision import UNDECIDED, Decision, Ending
-from riseg_drake.pushing.push import NO_PUSH, ArmPhase, Push
-from riseg_drake.pushing.push_path import PushPath
+from riseg_drake.pushing.push import NO_PUSH, Push
 from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest
 from riseg_drake.robot.limits import PANDA_LIMITS
 from riseg_drake.systems.arm_motion import ArmMotion, ArmMotionParameters, Permission

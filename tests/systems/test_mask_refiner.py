@@ -10,7 +10,7 @@ from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
 
 from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR, FramePair
-from riseg_drake.pushing.push import ArmPhase
+from riseg_drake.pushing.arm_path import ArmPhase
 from riseg_drake.systems.mask_refiner import NO_REFINED_MASK, MaskRefiner
 from tests.systems.ports import port_names
 

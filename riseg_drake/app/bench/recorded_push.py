@@ -14,7 +14,7 @@ from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.segmentation_block import STATION_PORTS
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.learned.sam import SamParameters
-from riseg_drake.pushing.push import ArmPhase
+from riseg_drake.pushing.arm_path import ArmPhase
 from riseg_drake.systems.stage_clock import StageClock
 
 Kept = TypeVar("Kept")

@@ -24,7 +24,7 @@ from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.learned.model_error import require
 from riseg_drake.learned.prompts import PromptedSegmenter, prompt_of_mask
 from riseg_drake.learned.sam import SamParameters, SamSegmenter, load_sam
-from riseg_drake.pushing.push import ArmPhase
+from riseg_drake.pushing.arm_path import ArmPhase
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.systems.mask_refiner import NO_REFINED_MASK, MaskRefiner
 

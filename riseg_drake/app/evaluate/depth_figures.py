@@ -10,7 +10,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.plane import NoPlaneError
 from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.recording.reader import RecordingReader
 from riseg_drake.recording.whole_file import write_png
@@ -19,6 +18,7 @@ from riseg_drake.segmentation.camera_motion import CameraMotionParameters, PoseE
 from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.optical_flow import DisFlow
 from riseg_drake.segmentation.surface import seek, surface_pixels
+from riseg_drake.segmentation.table_plane import NoPlaneError
 
 DEPTH_PICTURE = "depth.png"
 DISTANCES = (0.3, 0.5, 0.7, 1.0, 1.5)

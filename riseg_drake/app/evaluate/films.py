@@ -26,12 +26,12 @@ from riseg_drake.app.segment.recorded_view import recorded_view
 from riseg_drake.app.segment.replay import Replay
 from riseg_drake.evaluation.film_scores import FilmScores, film_table
 from riseg_drake.evaluation.true_things import true_things
-from riseg_drake.geometry.plane import NoPlaneError
 from riseg_drake.pictures.masks import draw_masks
 from riseg_drake.recording.layout import CAMERA_FILE, RecordingError
 from riseg_drake.recording.reader import RecordingReader
 from riseg_drake.recording.whole_file import write_png, write_text
 from riseg_drake.recording.writer import RecordingWriter
+from riseg_drake.segmentation.table_plane import NoPlaneError
 from riseg_drake.stations.still_film import StillFilmParameters, still_film
 
 FILMS = 10

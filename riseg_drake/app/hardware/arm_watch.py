@@ -9,7 +9,8 @@ from riseg_drake.app.diagram import WiredDiagram
 from riseg_drake.app.hardware.arm_travel import TravelError, WayBack, told
 from riseg_drake.app.hardware.terminal_operator import TerminalOperator
 from riseg_drake.app.run.interactions import Progress
-from riseg_drake.pushing.push import NO_PUSH, ArmPhase, Push
+from riseg_drake.pushing.arm_path import ArmPhase
+from riseg_drake.pushing.push import NO_PUSH, Push
 from riseg_drake.robot.supervisor import Cause, Mode
 from riseg_drake.stations.command_process import CommandProcess
 from riseg_drake.stations.command_session import StreamReport

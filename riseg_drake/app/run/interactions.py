@@ -16,8 +16,9 @@ from riseg_drake.evaluation.disturbance import Disturbance, motion_between, obje
 from riseg_drake.evaluation.in_motion import in_motion, moved_objects, overlap_f_of
 from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.pushing.arm_path import ArmPhase
 from riseg_drake.pushing.decision import UNDECIDED, Decision, Ending
-from riseg_drake.pushing.push import NO_PUSH, ArmPhase, Push
+from riseg_drake.pushing.push import NO_PUSH, Push
 from riseg_drake.segmentation.segmentation import Segmentation
 from riseg_drake.segmentation.untouched import untouched_clusters
 from riseg_drake.stations.physics import advance

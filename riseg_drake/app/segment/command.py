@@ -22,12 +22,12 @@ from riseg_drake.app.segment.replay import Replay
 from riseg_drake.app.tables import score_table, stage_table
 from riseg_drake.app.work_state import end_noted
 from riseg_drake.evaluation.scores import FIGURES, Scores, score
-from riseg_drake.geometry.plane import NoPlaneError
 from riseg_drake.host.files import MOST_SETTINGS, FileError, check_inside, read_text
 from riseg_drake.host.terminal import one_line
 from riseg_drake.recording import layout
 from riseg_drake.recording.layout import LeftOut, RecordedFrame, RecordingError
 from riseg_drake.recording.reader import RecordingReader
+from riseg_drake.segmentation.table_plane import NoPlaneError
 from riseg_drake.segmentation.untouched import untouched_clusters
 from riseg_drake.systems.stage_clock import StageClock
 
