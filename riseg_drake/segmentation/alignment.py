@@ -19,16 +19,16 @@ from riseg_drake.kernels.normal_equations import normal_equations
 from riseg_drake.segmentation.expected_flow import pixel_projection
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.noise import MeasurementNoise, depth_sigma
+from riseg_drake.segmentation.scales import OUTLIER, SAME_MOTION
 from riseg_drake.segmentation.surface import SurfacePixels, seek, surface_pixels
 
 _GRADIENT_MIN = 1.0
 """Squared gray gradient of a pixel that tells where it is, in variances of the sensor's noise."""
 _CORRELATED = 6.0
-"""Noise of depth is correlated over about so many pixels along an edge; they count as one."""
+"""Noise of depth is alike in about so many pixels along a line, the root of `CORRELATED_DEPTH`; they count as
+one."""
 _GRID = 4
 """Pixels between those without a gradient, whose noise of depth is hardly correlated."""
-_COST_MAX = np.float32(9)
-"""Squared normalised residuals count no more than that."""
 
 
 @dataclass
@@ -45,7 +45,7 @@ class AlignmentParameters:
     """Squared normalised residual from which a pixel counts ever less."""
     members_min: int = 60
     """Pixels that a motion needs to be sharpened."""
-    same_flow: float = 0.35
+    same_flow: float = SAME_MOTION
     """Pixels (root mean square); motions that predict flow within that are one."""
 
 
@@ -170,7 +170,7 @@ class RigidFit:
         z_1 = sought.read(self.depth)
         gray = np.square(sought.read_between(self.gray) - edges.gray) / edges.variance
         depth = np.square((z_1 - sought.depth) / depth_sigma(sought.depth, self.depth_noise))
-        squared = np.minimum(gray, _COST_MAX) + np.minimum(depth, _COST_MAX)
+        squared = np.minimum(gray, np.float32(OUTLIER)) + np.minimum(depth, np.float32(OUTLIER))
         return np.where(np.isnan(squared) | (z_1 <= 0), np.float32(2), squared)
 
     def align(

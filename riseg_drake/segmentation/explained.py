@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.noise import MeasurementNoise, gray_variance
+from riseg_drake.segmentation.scales import OUTLIER
 from riseg_drake.segmentation.surface import seek, surface_pixels
 
 _STEP = 3
 """Every so many pixels in both directions are asked."""
-_DISAGREES = 9.0
-"""Squared gray residual, in variances, from which two images disagree about a pixel."""
 
 
 def explained_share(
@@ -45,7 +44,7 @@ def explained_share(
     def agrees(motion: NDArray) -> NDArray[np.float32]:
         """1 where the images agree, 0 where not, NaN where they cannot be compared."""
         residual = seek(pixels, pair.X_C1C0 @ motion).read_between(pair.current.unhidden_gray) - gray
-        return np.where(np.isnan(residual), np.nan, residual**2 < _DISAGREES * variance).astype(np.float32)
+        return np.where(np.isnan(residual), np.nan, residual**2 < OUTLIER * variance).astype(np.float32)
 
     moved = agrees(np.eye(4)) == 0
     if np.count_nonzero(moved) * _STEP**2 < area_min:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from riseg_drake.kernels.misfits import misfits
 from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.expected_flow import pixel_projection
+from riseg_drake.segmentation.scales import CORRELATED_DEPTH, CORRELATED_GRAY, OUTLIER
 
 _SEEN = 0.25
 """Pixels of motion that an image shows."""
@@ -24,7 +25,7 @@ EXPECTED = 2.0
 class LikelihoodParameters:
     """What residuals are worth."""
 
-    residual_max: float = 9.0
+    residual_max: float = OUTLIER
     """Squared normalised residuals of gray and of depth count no more than that each (highlights)."""
     light: float = 0.05
     """Standard deviation of the factor by which the light on a superpixel changes, as shading does when things
@@ -33,12 +34,10 @@ class LikelihoodParameters:
     """The same where nothing moves: shading stays what it was."""
     light_view: float = 0.2
     """So much more of it from another view, where gloss shows other lights."""
-    correlated_gray: float = 3.0
-    """Errors of gray are alike in about so many points, or six pixels (pose, interpolation); they count as
-    one."""
-    correlated_depth: float = 14.0
-    """The same of depth, whose errors are those of matching windows: half of 4 pi sigma^2, pixels, for noise
-    that is smoothed over 1.5 pixels (docs/sensing.md)."""
+    correlated_gray: float = CORRELATED_GRAY / 2
+    """Errors of gray are alike in so many points, of which every second pixel is one; they count as one."""
+    correlated_depth: float = CORRELATED_DEPTH / 2
+    """The same of depth."""
     chance: float = 1.5
     """Times the mean squared residual that is usual, up to which a superpixel's may be by chance."""
     view_error: float = 0.005

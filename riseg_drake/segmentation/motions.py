@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.rgbd import Immutable
 from riseg_drake.geometry.se3 import exp_se3, move_points, translation
 from riseg_drake.segmentation.body_frames import BodyFrames
+from riseg_drake.segmentation.scales import SAME_MOTION
 from riseg_drake.segmentation.twists import fit_motion
 
 _POINTS_MAX = 200
@@ -18,10 +19,10 @@ _POINTS_MAX = 200
 class MotionParameters:
     """When two groups are one body after all, and when a group's motion is none."""
 
-    merge_flow: float = 0.35
+    merge_flow: float = SAME_MOTION
     """Pixels (root mean square); two motions that predict flow within that are one: no clustering can
     tell them apart, and Markov clustering splits a body now and then."""
-    still_flow: float = 0.7
+    still_flow: float = 2 * SAME_MOTION
     """Pixels (root mean square); a group that moves less than that stands still."""
 
     tilt: float = 0.03

@@ -6,6 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.segmentation.scales import FLOW_NOISE
+
 _WINDOW = 9
 """Pixels on a side of the window that flow is taken to match; DIS matches patches of 8."""
 _NOISE_GRADIENT = 0.057
@@ -16,7 +18,7 @@ _NOISE_GRADIENT = 0.057
 class MeasurementNoise:
     """Noise of one frame pair's measurements; depth noise is read off the table in every frame."""
 
-    flow: float = 0.2
+    flow: float = FLOW_NOISE
     """Standard deviation of optical flow on textured surfaces, pixels."""
     flow_max: float = 2.0
     """Where so little texture is that flow is worse than that, pixels, it is not used."""

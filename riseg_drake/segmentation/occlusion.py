@@ -7,8 +7,8 @@ sides may be one thing that is seen in two pieces; only motion can tell.
 import numpy as np
 from numpy.typing import NDArray
 
-_STEP = 0.004
-"""m; what is lower by so much goes on behind, not beside."""
+from riseg_drake.segmentation.scales import LOWEST
+
 _BESIDE = 3
 """Pixels from a border at which heights are read: nearer they are blurred."""
 _EVERY = 2
@@ -50,15 +50,15 @@ def _along(label: NDArray[np.intp], height: NDArray[np.float32], level: float) -
     for (a, b), h_0, h_1 in zip(sides.tolist(), before.tolist(), after.tolist(), strict=True):
         if a < 0 or b < 0:
             waiting = []  # the table is seen
-        elif h_1 > h_0 + _STEP:
+        elif h_1 > h_0 + LOWEST:
             waiting.append((a, h_0))
-        elif h_1 < h_0 - _STEP:
+        elif h_1 < h_0 - LOWEST:
             lower = []
             while waiting and waiting[-1][1] > h_1 - level:
                 behind, h = waiting.pop()
                 if h < h_1 + level:
                     found.append((behind, b))
-                if h < h_1 - _STEP:  # what is higher may be in front of it, too
+                if h < h_1 - LOWEST:  # what is higher may be in front of it, too
                     lower.append((behind, h))
             waiting += reversed(lower)
     return found

@@ -18,6 +18,7 @@ from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.effective_flow import effective_flow
 from riseg_drake.segmentation.motions import BFIFGroups
 from riseg_drake.segmentation.propagation import UNKNOWN
+from riseg_drake.segmentation.scales import SAME_MOTION
 from riseg_drake.segmentation.segmentation import Segmentation
 
 
@@ -27,7 +28,7 @@ class PaperParameters:
 
     flow_min: float = 0.8
     """Pixels of effective flow from which a pixel moves; the paper's ||X_t|| >> 0."""
-    similar_flow: float = 0.35
+    similar_flow: float = SAME_MOTION
     """Pixels; neighbours whose effective flow differs by less move "with similar gradient"."""
 
 

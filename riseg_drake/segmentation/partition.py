@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.multicut import multicut
 from riseg_drake.segmentation.potts import PottsGraph, potts_labels
+from riseg_drake.segmentation.scales import SMALLEST_OBJECT
 
 _NEVER = 1e3
 """Nats that a superpixel would cost in a part that is not beside its own."""
@@ -18,7 +19,7 @@ _NEVER = 1e3
 class PartitionParameters:
     """What counts as a body."""
 
-    area_min: float = 3.0e-4
+    area_min: float = SMALLEST_OBJECT
     """m^2; what is smaller is no object of its own."""
     rigid_min: float = 60.0
     """Nats that it must cost two parts to have one motion, before it counts against their being one body:

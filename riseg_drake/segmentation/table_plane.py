@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.segmentation.scales import DEPTH_NOISE
 
 _DOWNWARDS, _SIDEWAYS = 0.26, 0.7
 """Parts of a table's unit normal downwards and sideways in an upright picture: no more than those. A camera
@@ -34,9 +35,8 @@ class PlaneFitParameters:
     best eighth of these."""
     tolerance: float = 0.003
     """Distance, m, within which a point without depth noise would count as lying on the plane."""
-    depth_noise: float = 0.0023
-    """Standard deviation of depth at 1 m, m; it grows with the square of depth (D415: 0.08 px of
-    disparity, 55 mm baseline)."""
+    depth_noise: float = DEPTH_NOISE
+    """Standard deviation of depth at 1 m, m."""
     object_height: float = 0.4
     """m; things on a table are lower, and a table stands higher over its floor."""
     below_penalty: float = 0.5

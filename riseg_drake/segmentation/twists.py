@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.se3 import adjoint, exp_se3, inverse, log_se3, translation
 from riseg_drake.segmentation.body_frames import BodyFrames
 from riseg_drake.segmentation.noise import depth_sigma
+from riseg_drake.segmentation.scales import OUTLIER
 
 _GAUSS_NEWTON_STEPS = 3
-_OUTLIER = 9.0
-"""Squared normalised residual (three measurements) from which a point counts ever less."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +153,7 @@ def fit_motion(
         W_residual = W @ residual
         squared = (residual * W_residual).sum((-2, -1))
         # Cauchy weights: a point on another body pulls less the less it fits.
-        weight = used / (1.0 + squared / _OUTLIER)
+        weight = used / (1.0 + squared / OUTLIER)
         _fill_jacobian(J, moved)
         J_W = ((W * weight[..., None, None]) @ J).reshape(K, -1, 6).swapaxes(1, 2)
         normal = J_W @ J.reshape(K, -1, 6)

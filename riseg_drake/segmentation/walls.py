@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.segmentation.scales import DEPTH_NOISE
+
 _WALLS, _HYPOTHESES = 3, 96
 """Walls that are looked for, and lines through two points that are tried for each."""
 
@@ -27,7 +29,7 @@ class WallParameters:
     """m above the table; what is lower is not asked."""
     thickness: float = 0.01
     """m; depth noise comes on top."""
-    depth_noise: float = 0.0023
+    depth_noise: float = DEPTH_NOISE
     """Standard deviation of depth at 1 m, m, that is reckoned with."""
 
 
