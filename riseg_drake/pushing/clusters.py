@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.geometry.camera import bounding_region
 from riseg_drake.geometry.nearest import nearest_values
 from riseg_drake.pushing.clustering import Clustering, ClusteringParameters, clusterings
 from riseg_drake.pushing.table_map import TableMap
@@ -20,6 +21,8 @@ from riseg_drake.pushing.table_map import TableMap
 HALVES = 2
 """A piece with a nook that no neck divides is at least this many clusters: half an object moves as well
 as a whole one, but two objects pushed together look like one."""
+_FREE = 2
+"""Cells around what is looked at, so that its outline has an outside."""
 
 
 @dataclass
@@ -111,6 +114,8 @@ def split_at_necks(
 
     What would be smaller than `smallest`, m^2, is a limb rather than a piece and stays where it is.
     """
+    region = bounding_region(mask, _FREE)
+    whole, mask = mask, mask[region]
     closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     depth_inside = cv2.distanceTransform(closed, cv2.DIST_L2, 5) * table.cell
     amount, core_of = cv2.connectedComponents((depth_inside > neck / 2).astype(np.uint8), connectivity=4)
@@ -121,7 +126,11 @@ def split_at_necks(
         core_of[limb[core_of]] = 0
         piece = _by_nearest_core(mask, core_of)
     numbers = np.unique(piece[mask])
-    return [mask & (piece == number) for number in numbers] if len(numbers) > 1 else [mask]
+    if len(numbers) == 1:
+        return [whole]
+    parts = np.zeros((len(numbers), *whole.shape), bool)
+    parts[:, *region] = mask & (piece == numbers[:, None, None])
+    return list(parts)
 
 
 def _by_nearest_core(mask: NDArray[np.bool_], core_of: NDArray) -> NDArray[np.int_]:
@@ -134,6 +143,7 @@ def _by_nearest_core(mask: NDArray[np.bool_], core_of: NDArray) -> NDArray[np.in
 
 def concavity(piece: NDArray[np.bool_], cell: float) -> float:
     """How far the outline of a piece [rows, columns] recedes from its convex hull, m. Holes do not count."""
+    piece = piece[bounding_region(piece, _FREE)]
     outlines, _ = cv2.findContours(piece.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     filled, hull = np.zeros((2, *piece.shape), np.uint8)
     cv2.drawContours(filled, outlines, -1, 1, cv2.FILLED)

@@ -14,7 +14,7 @@ from riseg_drake.pushing.boundary import BoundaryParameters, boundary
 from riseg_drake.pushing.clusters import Cluster, ClustersParameters, find_clusters
 from riseg_drake.pushing.contact import find_contacts
 from riseg_drake.pushing.decision import Criterion, Decision, Ending, PathStage
-from riseg_drake.pushing.gain import GainParameters, expected_gain
+from riseg_drake.pushing.gain import GainParameters, expected_gain, most_to_expect
 from riseg_drake.pushing.levels import LevelsParameters, raised
 from riseg_drake.pushing.objects_to_segment import ObjectsToSegmentParameters, things_to_push
 from riseg_drake.pushing.push import NO_PUSH, Push
@@ -197,15 +197,21 @@ def valid_pushes_of(
     center_W, P = cluster.center_W, cluster.cells
     direction_W = center_W - boundary_W
     direction_W /= np.linalg.norm(direction_W, axis=1, keepdims=True)
+    in_doubt = table.doubtful is not None or table.carrying is not None
+    least = parameters.gain.least if in_doubt else 0.0
+    thing = P if table.doubtful is None else table.doubtful == table.doubtful[P][0]
+    tries = times_pushed(thing, table, tried, validity.d_push)
+    if most_to_expect(np.count_nonzero(P) * table.cell_area, tries, parameters.gain) <= least:
+        # No other criterion needs to be asked, which takes most of the time of a decision.
+        none = np.zeros(len(boundary_W), bool)
+        return [], {each: ~none if each is Criterion.NOT_IN_VAIN else none for each in Criterion}
     contacts = find_contacts(
         boundary_W, direction_W, pushed, table, pusher, validity, target=None if alone else P
     )
     is_valid = is_valid_push(contacts.b_W, direction_W, center_W, P, table, pusher, validity)
-    in_doubt = table.doubtful is not None or table.carrying is not None
-    thing = P if table.doubtful is None else table.doubtful == table.doubtful[P][0]
     gain = expected_gain(
         contacts, direction_W, is_valid.overlap, P, table,
-        tried, times_pushed(thing, table, tried, validity.d_push), heading_W, validity, parameters.gain,
+        tried, tries, heading_W, validity, parameters.gain,
     )  # fmt: skip
     passed = {
         Criterion.CENTER_ON_OBJECT: is_valid.center_on_object,
@@ -215,7 +221,7 @@ def valid_pushes_of(
         Criterion.ONLY_TARGET: contacts.only_target & (contacts.transmitted > 0),
         Criterion.STAYS_IN_WORK_AREA: stays_in_work_area(direction_W, P, table, validity.d_push),
         Criterion.STAYS_ON_TOP: overhang(direction_W, P, table, validity.d_push) <= validity.l_act,
-        Criterion.NOT_IN_VAIN: gain > (parameters.gain.least if in_doubt else 0.0),
+        Criterion.NOT_IN_VAIN: gain > least,
     }
     tallest = float(table.height.max())
     cluster_W = table.points(P)

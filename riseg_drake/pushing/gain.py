@@ -40,6 +40,13 @@ class GainParameters:
     """Distance, m, over which a push is like one that was made."""
 
 
+def most_to_expect(area: float, tries: int, parameters: GainParameters) -> float:
+    """Objects that any push of a thing can settle at most: of `area`, m^2, and pushed so often before."""
+    if tries >= parameters.tries:
+        return 0.0
+    return float(area / (area + parameters.object_area) * 0.5**tries)
+
+
 def expected_gain(
     contacts: Contacts,
     direction_W: NDArray,
@@ -57,10 +64,7 @@ def expected_gain(
     `overlap` [N] is |isect| / |P|, `tries` how often the cluster was pushed before, and `heading_W` [2] where
     the camera's "up" points now (None if turning costs nothing).
     """
-    if tries >= parameters.tries:
-        return np.zeros(len(direction_W))
     P = table.points(cluster)
-    area = len(P) * table.cell_area
     along = P @ direction_W.T  # [M, N]
     extent = along.max(axis=0) - along.min(axis=0) + table.cell
     top = float(np.percentile(table.height[cluster], 95))
@@ -68,8 +72,7 @@ def expected_gain(
     crowded = (overlap + overlap_after_push(direction_W, cluster, table, 2 * validity.d_push)) / 2
     new = novelty(contacts.b_W, direction_W, tried, parameters.tried_distance)  # [N, T]
     gain = (
-        area / (area + parameters.object_area)
-        * 0.5**tries
+        most_to_expect(len(P) * table.cell_area, tries, parameters)
         * np.exp(-crowded / validity.l_act)  # moves alone
         * (1.0 - contacts.beside_target)  # and nothing else with it
         * contacts.transmitted
