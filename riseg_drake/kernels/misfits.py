@@ -9,7 +9,7 @@ from riseg_drake.kernels.reading import between, nearest, projected
 
 @compiled(
     "UniTuple(float64[::1], 2)(float32[:, ::1], float32[::1], float32[::1], intp[::1], intp, float32[:, ::1],"
-    "float32[:, ::1], float32[:, ::1], float64, float64, boolean, float64, float64, float64, float64)"
+    "float32[:, ::1], float32[:, ::1], float64, float64, float64, float64, float64, float64)"
 )
 def misfits(
     pixel: NDArray[np.float32],
@@ -22,7 +22,6 @@ def misfits(
     depth_1: NDArray[np.float32],
     depth_noise: float,
     depth_error: float,
-    hides: bool,
     certainty: float,
     per_depth: float,
     most: float,
@@ -44,7 +43,6 @@ def misfits(
         depth_1: [H, W], m; 0 where there is none.
         depth_noise: of the difference of two depths at 1 m, m.
         depth_error: share of depth by which it errs besides.
-        hides: whether what is nearer than expected by as much as counts is something else, before the point.
         certainty: 1 / variance of the factor, in the measure of a superpixel's squared residuals.
         per_depth: what a squared residual of depth counts beside one of gray.
         most: squared residuals count no more than that.
@@ -57,11 +55,6 @@ def misfits(
         p = owner[n]
         u, v, c = projected(M, pixel, n)
         after[n] = between(gray_1, u, v)
-        z_1, z = nearest(depth_1, u, v), c / pixel[3, n]
-        variance = (depth_noise * z * z) ** 2 + (depth_error * z) ** 2
-        of_depth = min((z_1 - z) ** 2 / variance, most)
-        if hides and 0 < z_1 < z and of_depth == most:
-            after[n] = np.nan
         if np.isnan(after[n]):
             lost[p] += 1
             total[p] += expected
@@ -72,9 +65,12 @@ def misfits(
         before_before[p] += weighted * gray[n]
         of_gray[p] += min(per_variance[n] * (after[n] - gray[n]) ** 2, most)
         total[p] += 1
+        z_1 = nearest(depth_1, u, v)
         if z_1 > 0:
+            z = c / pixel[3, n]
+            variance = (depth_noise * z * z) ** 2 + (depth_error * z) ** 2
             # Against what is right: depth that is not there says neither.
-            total[p] += per_depth * (of_depth - 1)
+            total[p] += per_depth * (min((z_1 - z) ** 2 / variance, most) - 1)
     # The likeliest factor, by least squares, where the light seems to have changed; it costs once.
     factor, of_factor = np.ones(count), np.full(count, np.inf)
     for p in range(count):

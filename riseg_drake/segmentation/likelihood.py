@@ -61,8 +61,7 @@ class Costs:
     point_count: NDArray[np.float64]
     """[N], how many points each superpixel has."""
     lost: NDArray[np.float64]
-    """[G, N], share of them that cannot be compared, as they are behind the robot or something else, or out of
-    the image."""
+    """[G, N], share of them that cannot be compared, as they are behind the robot or out of the image."""
     leaves: NDArray[np.float64]
     """[N], share of them that the camera's own motion takes out of the image."""
 
@@ -154,7 +153,6 @@ def _misfit(
         frame.unhidden_depth,
         float(np.sqrt(2)) * compared.depth_noise,
         compared.depth_error,
-        parameters.view_errors * compared.shift > _SEEN,  # then what is hollow hides its inside
         parameters.correlated_gray / light**2,
         parameters.correlated_gray / parameters.correlated_depth,
         parameters.residual_max,

@@ -39,7 +39,7 @@ def costs(before: np.ndarray, after: np.ndarray, certainty: float = CERTAINTY) -
     per_variance = np.full(len(before), 1 / SIGMA**2, np.float32)
     total, lost = misfits(
         pixels(), before, per_variance, PIECE, 2, ONTO_ITSELF, image(after), NO_DEPTH,
-        0.003, 0.0, False, certainty, PER_DEPTH, MOST, EXPECTED,
+        0.003, 0.0, certainty, PER_DEPTH, MOST, EXPECTED,
     )  # fmt: skip
     np.testing.assert_array_equal(lost, 0)
     return total - np.bincount(PIECE)
@@ -68,7 +68,7 @@ def test_the_factor_is_the_likeliest_one() -> None:
     after[0] = 90
     total, _ = misfits(
         pixels(), before, ones, np.arange(800), 800, ONTO_ITSELF, image(after), NO_DEPTH,
-        0.003, 0.0, False, 1e4, PER_DEPTH, 1e4, EXPECTED,
+        0.003, 0.0, 1e4, PER_DEPTH, 1e4, EXPECTED,
     )  # fmt: skip
     assert total[0] - 1 == pytest.approx((90 - 95) ** 2 + 1e4 * 0.05**2)
     np.testing.assert_array_equal(total[1:], 1)
@@ -84,7 +84,7 @@ def test_what_was_not_found_counts_as_expected_and_says_nothing_about_the_rest()
     after[5:8] = np.nan  # rows 4 to 7 cannot be read between pixels
     total, lost = misfits(
         pixels(), before, np.full(800, 1 / SIGMA**2, np.float32), PIECE, 2, ONTO_ITSELF, after, NO_DEPTH,
-        0.003, 0.0, False, CERTAINTY, PER_DEPTH, MOST, EXPECTED,
+        0.003, 0.0, CERTAINTY, PER_DEPTH, MOST, EXPECTED,
     )  # fmt: skip
     np.testing.assert_array_equal(lost, [160, 0])
     assert total[0] == pytest.approx(160 * EXPECTED + 240 * 2 + CERTAINTY * 0.25, rel=0.1)
@@ -96,28 +96,10 @@ def test_depth_costs_its_squared_residual_less_what_is_right(nearer: float, erro
     depth = np.full((21, 41), 0.5 - nearer, np.float32)
     total, _ = misfits(
         pixels(), before, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, image(before), depth,
-        0.004, error, False, CERTAINTY, PER_DEPTH, MOST, EXPECTED,
+        0.004, error, CERTAINTY, PER_DEPTH, MOST, EXPECTED,
     )  # fmt: skip
     squared = nearer**2 / ((0.004 * 0.25) ** 2 + (error * 0.5) ** 2)
     np.testing.assert_allclose(total / 400, 1 + PER_DEPTH * (min(squared, MOST) - 1), rtol=1e-3)
-
-
-@pytest.mark.parametrize(("nearer", "hides", "hidden"), [
-    (0.0031, True, True),  # 3.1 standard deviations: no less than the 9 that counts
-    (0.0029, True, False),
-    (-0.1, True, False),  # what is farther does not hide
-    (0.1, False, False),
-])  # fmt: skip
-def test_a_point_behind_what_is_nearer_cannot_be_compared(nearer: float, hides: bool, hidden: bool) -> None:
-    before = pattern(0)
-    depth = np.full((21, 41), 0.5 - nearer, np.float32)
-    total, lost = misfits(
-        pixels(), before, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, image(before), depth,
-        0.004, 0.0, hides, CERTAINTY, PER_DEPTH, MOST, EXPECTED,
-    )  # fmt: skip
-    np.testing.assert_array_equal(lost, 400 * hidden)
-    of_depth = PER_DEPTH * (min((nearer / 0.001) ** 2, MOST) - 1)
-    np.testing.assert_allclose(total / 400, EXPECTED if hidden else 1 + of_depth, rtol=1e-3)
 
 
 def test_under_any_motion_it_is_what_numpy_and_opencv_find() -> None:
@@ -133,7 +115,7 @@ def test_under_any_motion_it_is_what_numpy_and_opencv_find() -> None:
     M = np.array([[1.02, 0.03, -2, 1.2], [-0.02, 0.98, 3, -0.8], [1e-4, -1e-4, 1, 0.004]], np.float32)
     total, lost = misfits(
         pixel, gray, per_variance, owner, 12, M, gray_1, depth_1,
-        0.003, 0.002, False, CERTAINTY, PER_DEPTH, MOST, EXPECTED,
+        0.003, 0.002, CERTAINTY, PER_DEPTH, MOST, EXPECTED,
     )  # fmt: skip
 
     a, b, c = M @ pixel

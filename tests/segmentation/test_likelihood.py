@@ -123,18 +123,6 @@ def test_what_cannot_be_compared_is_missed_by_no_motion_however_little_noise_the
     np.testing.assert_allclose(excess[0], [0, 0, 0, (5.0 - 1.5) * 12 / 3 / 2])
 
 
-def test_what_hides_itself_from_another_view_is_not_compared_and_from_the_same_view_it_is(
-    plate: tuple[Keyframe, Frame],
-) -> None:
-    keyframe, frame = plate
-    covered = replace(frame, depth=frame.depth * np.float32(0.8))
-    for another, lost in ((0.0, 0), (1.0, 1)):
-        compared = Comparison(keyframe, covered, DEPTH_NOISE, view_error=0.01)
-        vars(compared)["another_view"] = another
-        costs = motion_costs(compared, STILL, LikelihoodParameters())
-        np.testing.assert_array_equal(costs.lost[0][costs.point_count > 0], lost)
-
-
 def test_what_is_behind_the_robot_or_outside_the_image_is_hidden(plate: tuple[Keyframe, Frame]) -> None:
     keyframe, frame = plate
     behind = replace(frame, robot=np.ones_like(frame.robot))
