@@ -123,7 +123,10 @@ def pictures(chosen: argparse.Namespace, console: Console) -> None:
 
 
 def _request(kind: type[Request], chosen: argparse.Namespace) -> Request:
-    """What was chosen, as a command's dataclass has it: the options have its fields' names."""
+    """What was chosen, as a command's dataclass has it.
+
+    The options have the names of its fields; those left open are as it has them.
+    """
     names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
     values: dict[str, Any] = {name: getattr(chosen, name) for name in names}
     return kind(**{name: value for name, value in values.items() if value is not None})

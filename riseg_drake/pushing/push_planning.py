@@ -27,7 +27,7 @@ class PushPlanningParameters:
 
 
 @runtime_checkable
-class ObjectsAboveTable(Protocol):
+class SeenTable(Protocol):
     """GetObjsAboveTable of one frame (Alg. 3, line 1), by whatever tells what stands on the table."""
 
     @property
@@ -48,7 +48,7 @@ class ObjectsAboveTable(Protocol):
 
 def plan_push(
     frame: Frame,
-    above: ObjectsAboveTable,
+    above: SeenTable,
     mask: NDArray,
     q_observe: NDArray,
     kinematics: PandaKinematics,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.camera import Intrinsics, bounding_region
 from riseg_drake.geometry.plane import heights_above_plane, transform_plane
 from riseg_drake.geometry.rgbd import Frame, Immutable
-from riseg_drake.segmentation.scales import LOWEST, SMALLEST_OBJECT
+from riseg_drake.segmentation.scales import LOWEST, SMALLEST_SEEN
 from riseg_drake.segmentation.table_extent import TableExtentParameters, on_this_table
 from riseg_drake.segmentation.table_plane import PlaneFitParameters, fit_plane
 
@@ -39,7 +39,7 @@ class AboveTableParameters:
     """What is nowhere higher than so many standard deviations of the depth seen on the table is table."""
     foot_multiple: float = 2.0
     """The foot of what rises higher than that is as high as so many of them."""
-    area_min: float = round(SMALLEST_OBJECT / 3, 9)
+    area_min: float = SMALLEST_SEEN
     """m^2; a smaller piece is noise, not an object."""
     extent: TableExtentParameters = field(default_factory=TableExtentParameters)
 

@@ -15,7 +15,7 @@ from riseg_drake.geometry.camera import Region, bounding_region, pixel_grid
 from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.noise import MeasurementNoise, gray_variance
-from riseg_drake.segmentation.scales import SMALLEST_OBJECT
+from riseg_drake.segmentation.scales import SMALLEST_SEEN
 
 _COST_MAX = np.float32(25)
 """Squared normalised residuals count no more than that."""
@@ -33,7 +33,7 @@ class MovingParameters:
     """By how much standing still must explain the images worse, in squared normalised residuals."""
     window: float = 0.006
     """m on the object over which that evidence is averaged."""
-    area_min: float = round(SMALLEST_OBJECT / 3, 9)
+    area_min: float = SMALLEST_SEEN
     """m^2; where less than that moves, nothing does."""
 
 

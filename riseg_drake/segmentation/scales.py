@@ -6,8 +6,9 @@ that is none of these says where it comes from.
 
 SMALLEST_OBJECT = 3.0e-4
 """m^2, as large as it appears from above: a square of 17 mm (a lying AA battery has 7e-4, a coin of a cent
-2e-4). What is smaller is no object of its own; of one that is half hidden a third of that may be seen. Set by
-hand."""
+2e-4). What is smaller is no object of its own. Set by hand."""
+SMALLEST_SEEN = 1.0e-4
+"""m^2; a third of that: what may be seen of one that is half hidden, and what is smaller is noise."""
 LOWEST = 0.004
 """m; a step of height that is one, and how far above the table begins what stands on it: four standard
 deviations of depth at 0.65 m."""

@@ -6,7 +6,7 @@ from pydrake.systems.framework import Context, LeafSystem
 
 from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR
 from riseg_drake.pushing.decision import UNDECIDED
-from riseg_drake.pushing.push_planning import ObjectsAboveTable, PushPlanningParameters, plan_push
+from riseg_drake.pushing.push_planning import PushPlanningParameters, SeenTable, plan_push
 from riseg_drake.pushing.tried_pushes import TriedPush
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
@@ -47,9 +47,7 @@ class PushPlanner(LeafSystem):
         self._parameters = parameters or PushPlanningParameters()
         self._seed = seed
         self._pair = ValueInput(self, "pair", NO_PAIR)
-        self._above: ValueInput[ObjectsAboveTable] = ValueInput(
-            self, "above_table", NOTHING_ABOVE_TABLE, ObjectsAboveTable
-        )
+        self._above: ValueInput[SeenTable] = ValueInput(self, "above_table", NOTHING_ABOVE_TABLE, SeenTable)
         self._mask = ValueInput(self, "mask", NO_MASK)
         self._position = self.DeclareVectorInputPort("position", 7)
         self._tried: ValueInput[tuple[TriedPush, ...]] = ValueInput(self, "tried_pushes", ())

@@ -8,7 +8,7 @@ from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, LeafSystem
 
 from riseg_drake.geometry.rgbd import NO_PAIR, FramePair
-from riseg_drake.pushing.push_planning import ObjectsAboveTable
+from riseg_drake.pushing.push_planning import SeenTable
 from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
 from riseg_drake.systems.expected_flow import ExpectedFlow
 from riseg_drake.systems.value_input import ValueInput
@@ -69,7 +69,7 @@ def test_what_has_the_names_of_a_protocol_is_taken_and_what_lacks_one_is_not() -
     class Planner(LeafSystem):
         def __init__(self) -> None:
             super().__init__()
-            self.above = ValueInput(self, "above", NOTHING_ABOVE_TABLE, ObjectsAboveTable)
+            self.above = ValueInput(self, "above", NOTHING_ABOVE_TABLE, SeenTable)
 
     planner = Planner()
     context = planner.CreateDefaultContext()
@@ -77,5 +77,5 @@ def test_what_has_the_names_of_a_protocol_is_taken_and_what_lacks_one_is_not() -
         planner.get_input_port().FixValue(context, AbstractValue.Make(value))
         assert isinstance(planner.above.Eval(context), type(value))
     planner.get_input_port().FixValue(context, AbstractValue.Make(WithoutTable()))
-    with pytest.raises(TypeError, match=r"ObjectsAboveTable, not .*WithoutTable"):
+    with pytest.raises(TypeError, match=r"SeenTable, not .*WithoutTable"):
         planner.above.Eval(context)
