@@ -12,7 +12,7 @@ from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSys
 from pydrake.trajectories import PiecewisePolynomial
 
 from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR, FramePair, Immutable
-from riseg_drake.pushing.arm_path import ArmPhase
+from riseg_drake.pushing.arm_path import ArmPhase, PushPath
 from riseg_drake.pushing.decision import UNDECIDED, Decision, Ending
 from riseg_drake.pushing.push import NO_PUSH, Push
 from riseg_drake.pushing.time_law import minimum_jerk
@@ -55,27 +55,71 @@ class ArmMotionParameters:
 
 
 @dataclass(frozen=True)
+class _Attempt(Immutable):
+    """A push, and what was segmented before it."""
+
+    push: Push
+    before: SegmentedSoFar
+
+    def tried(self, changed: bool) -> TriedPush:
+        """What the planner is told of it."""
+        return TriedPush(self.push.p_WB, self.push.direction_W, changed)
+
+
+@dataclass(frozen=True)
+class _Observing(Immutable):
+    """At the observation posture, or on the last bit of the way there."""
+
+    since: float | None = None
+    """Since when it has been at rest there, s; None while it is not."""
+
+
+@dataclass(frozen=True)
+class _Proposed(Immutable):
+    """At the observation posture, with a push that has not been permitted yet."""
+
+    attempt: _Attempt
+    since: float
+    """Since when it has been at rest there, s."""
+
+
+@dataclass(frozen=True)
+class _Pushing(Immutable):
+    """On the path of a push."""
+
+    attempt: _Attempt
+    path: PushPath
+    start_time: float
+    """s."""
+    offset: NDArray[np.float64]
+    """Of the commanded joint angles from the path at its start, rad."""
+
+
+@dataclass(frozen=True)
+class _Returning(Immutable):
+    """It was moved by hand, and comes back to the observation posture."""
+
+    path: PiecewisePolynomial
+    start_time: float
+    """s."""
+    given_up: _Attempt | None
+    """The push that it was at."""
+
+
+@dataclass(frozen=True)
+class _Finished(Immutable):
+    """There is no push any more."""
+
+
+@dataclass(frozen=True)
 class _Memory(Immutable):
     """All that ArmMotion remembers. Never changed, only replaced."""
 
+    doing: _Observing | _Proposed | _Pushing | _Returning | _Finished = _Observing()
     interaction_step: int = 0
-    push: Push = NO_PUSH
-    """What the arm is doing now; NO_PUSH at the observation posture."""
-    proposed: Push = NO_PUSH
-    """What it would do next, and has not been permitted yet."""
-    way_back: PiecewisePolynomial | None = None
-    """What it does instead: it was moved by hand, and comes back to the observation posture."""
-    start_time: float = 0.0
-    """Of that, or of the push, s."""
     end_time: float = -np.inf
     """When the last motion was over, as far as commands go, s."""
-    offset: NDArray[np.float64] = field(default_factory=lambda: np.zeros(7))
-    """Of the commanded joint angles from the path at its start, rad."""
-    rest_since: float | None = None
-    """Since when the arm has been at rest at the observation posture, s; None while it is not."""
-    segmented_before: SegmentedSoFar | None = None
-    """What was segmented before the last push."""
-    unjudged: Push = NO_PUSH
+    unjudged: _Attempt | None = None
     """A push that is over but of which it is not known yet what it brought."""
     tried: tuple[TriedPush, ...] = ()
     decision: Decision = UNDECIDED
@@ -83,12 +127,20 @@ class _Memory(Immutable):
     asked: int = -1
     """... and in which frame."""
     nulls: int = 0
-    done: bool = False
+    """Frames in a row in which no push was found."""
+
+    @property
+    def attempt(self) -> _Attempt | None:
+        """The push that is being done, or waits for permission."""
+        match self.doing:
+            case _Proposed(attempt) | _Pushing(attempt) | _Returning(given_up=attempt):
+                return attempt
+        return None
 
     @property
     def active_push(self) -> Push:
-        """The push that is being done, or waits for permission."""
-        return self.proposed if self.push is NO_PUSH else self.push
+        """The same for those who want a push alone: NO_PUSH where there is none."""
+        return NO_PUSH if self.attempt is None else self.attempt.push
 
 
 class ArmMotion(LeafSystem):
@@ -167,23 +219,25 @@ class ArmMotion(LeafSystem):
 
     def _command(self, memory: _Memory, time: float) -> NDArray[np.float64]:
         """The joint angles [7] to command at a time."""
-        if memory.way_back is not None:
-            return memory.way_back.value(min(time - memory.start_time, memory.way_back.end_time()))[:, 0]
-        if memory.push.path is None:
-            return self._q_observe
-        path, since = memory.push.path, time - memory.start_time
-        to_an_end = min(since, path.duration - since) / self._parameters.fade_time
-        fading = 1.0 - minimum_jerk(np.clip(to_an_end, 0.0, 1.0))[0]
-        return path.position(since) + fading * memory.offset
+        match memory.doing:
+            case _Returning(path, start_time):
+                return path.value(min(time - start_time, path.end_time()))[:, 0]
+            case _Pushing(_, push_path, start_time, offset):
+                since = time - start_time
+                to_an_end = min(since, push_path.duration - since) / self._parameters.fade_time
+                fading = 1.0 - minimum_jerk(np.clip(to_an_end, 0.0, 1.0))[0]
+                return push_path.position(since) + fading * offset
+        return self._q_observe
 
     def _calc_phase(self, memory: _Memory, time: float) -> ArmPhase:
-        if memory.done:
-            return ArmPhase.DONE
-        if memory.push.path is None:
-            return ArmPhase.OBSERVE
-        if memory.way_back is not None:
-            return ArmPhase.RETREAT
-        return memory.push.path.phase(time - memory.start_time)
+        match memory.doing:
+            case _Finished():
+                return ArmPhase.DONE
+            case _Returning(given_up=_Attempt()):
+                return ArmPhase.RETREAT
+            case _Pushing(_, path, start_time):
+                return path.phase(time - start_time)
+        return ArmPhase.OBSERVE
 
     def _update(self, context: Context, state: State) -> EventStatus:
         after = self._next(self._recall(context), context)
@@ -191,102 +245,97 @@ class ArmMotion(LeafSystem):
 
     def _next(self, memory: _Memory, context: Context) -> _Memory:
         """One step of the loop; it does one thing at a time, so that each sees the one before done."""
-        parameters, time = self._parameters, context.get_time()
-        if memory.done:
+        time = context.get_time()
+        if isinstance(memory.doing, _Finished):
             return memory
         way_back = self._way_back() if self._way_back is not None else None
         if way_back is not None:
-            return replace(memory, way_back=way_back, start_time=time, proposed=NO_PUSH, rest_since=None)
-        if memory.push is not NO_PUSH or memory.way_back is not None:
-            return self._after_motion(memory, time)
-        if memory.proposed is not NO_PUSH:
-            return self._ask(memory, time)
+            given_up = None if isinstance(memory.doing, _Proposed) else memory.attempt
+            return replace(memory, doing=_Returning(way_back, time, given_up))
+        match memory.doing:
+            case _Proposed(attempt, since):
+                return self._ask(memory, attempt, since, time)
+            case _Pushing(attempt, path, start_time):
+                return _after_motion(memory, attempt, start_time + path.duration, time)
+            case _Returning(way, start_time, attempt):
+                return _after_motion(memory, attempt, start_time + way.end_time(), time)
+            case _Observing(since):
+                return self._observe(memory, since, context)
 
+    def _observe(self, memory: _Memory, since: float | None, context: Context) -> _Memory:
+        """Wait until the arm rests and sees; judge the push before, or find the next one."""
+        parameters, time = self._parameters, context.get_time()
         error = np.abs(self._measured.Eval(context) - self._q_observe).max()
         done = self._done_until is None or self._done_until() >= memory.end_time
         if error > parameters.rest_tolerance or not done:
-            return memory if memory.rest_since is None else replace(memory, rest_since=None)
-        if memory.rest_since is None:
-            return replace(memory, rest_since=time)
+            return memory if since is None else replace(memory, doing=_Observing())
+        if since is None:
+            return replace(memory, doing=_Observing(time))
         pair = self._pair.Eval(context)
         decided = not self._decided.HasValue(context) or self._decided.Eval(context)
         settle = parameters.settle_time if decided else parameters.settle_longest
-        if pair is NO_PAIR or pair.current.time < memory.rest_since + settle:
+        if pair is NO_PAIR or pair.current.time < since + settle:
             return memory
-        if memory.unjudged is not NO_PUSH:
-            return self._judge(memory, pair, context)
+        if memory.unjudged is not None:
+            return self._judge(memory, memory.unjudged, pair, context)
         if memory.asked == pair.current.sequence:
             return memory
 
         decision = self._decision.Eval(context)
         memory = replace(memory, decision=decision, asked=pair.current.sequence)
         if memory.interaction_step >= parameters.most_interactions:
-            return replace(memory, decision=_enough(decision), done=True)
+            return replace(memory, decision=_enough(decision), doing=_Finished())
         if decision.push is NO_PUSH:
             nulls = memory.nulls + 1
-            return replace(memory, nulls=nulls, done=nulls >= parameters.null_frames)
-        proposal = replace(
-            memory, proposed=decision.push, nulls=0, segmented_before=self._segmented(pair, context)
-        )
-        return self._ask(proposal, time)
+            doing = _Finished() if nulls >= parameters.null_frames else memory.doing
+            return replace(memory, nulls=nulls, doing=doing)
+        attempt = _Attempt(decision.push, self._segmented(pair, context))
+        return self._ask(replace(memory, doing=_Proposed(attempt, since), nulls=0), attempt, since, time)
 
-    def _ask(self, memory: _Memory, time: float) -> _Memory:
+    def _ask(self, memory: _Memory, attempt: _Attempt, since: float, time: float) -> _Memory:
         """Begin with the proposed push, if that is permitted."""
-        push = memory.proposed
-        match Permission.DO if self._permit is None else self._permit(push):
+        match Permission.DO if self._permit is None else self._permit(attempt.push):
             case Permission.DO:
-                return replace(
-                    memory,
-                    proposed=NO_PUSH,
-                    push=push,
-                    start_time=time,
-                    offset=self._offset_from(push),
-                    rest_since=None,
-                )
+                path = attempt.push.path
+                if path is None:
+                    raise ValueError("the push has no path; give it one with plan_push_path")
+                return replace(memory, doing=_Pushing(attempt, path, time, self._offset_from(path)))
             case Permission.SKIP:
-                tried = TriedPush(push.p_WB, push.direction_W, changed=False)
-                return replace(memory, proposed=NO_PUSH, tried=(*memory.tried, tried))
+                tried = (*memory.tried, attempt.tried(changed=False))
+                return replace(memory, doing=_Observing(since), tried=tried)
             case Permission.END:
-                return replace(memory, proposed=NO_PUSH, done=True)
+                return replace(memory, doing=_Finished())
         return memory
 
-    def _after_motion(self, memory: _Memory, time: float) -> _Memory:
-        if memory.way_back is not None:
-            duration = memory.way_back.end_time()
-        else:
-            assert memory.push.path is not None
-            duration = memory.push.path.duration
-        if time < memory.start_time + duration:
-            return memory
-        after = replace(memory, push=NO_PUSH, way_back=None, end_time=time)
-        if memory.push is NO_PUSH:
-            return after
-        return replace(after, interaction_step=memory.interaction_step + 1, unjudged=memory.push)
-
-    def _judge(self, memory: _Memory, pair: FramePair, context: Context) -> _Memory:
+    def _judge(self, memory: _Memory, attempt: _Attempt, pair: FramePair, context: Context) -> _Memory:
         """Remember what the last push brought."""
-        assert memory.segmented_before is not None
-        changed = self._segmented(pair, context).differs_from(
-            memory.segmented_before, self._parameters.unchanged_area
-        )
-        tried = TriedPush(memory.unjudged.p_WB, memory.unjudged.direction_W, changed)
-        return replace(memory, tried=(*memory.tried, tried), unjudged=NO_PUSH)
+        segmented = self._segmented(pair, context)
+        changed = segmented.differs_from(attempt.before, self._parameters.unchanged_area)
+        return replace(memory, tried=(*memory.tried, attempt.tried(changed)), unjudged=None)
 
     def _segmented(self, pair: FramePair, context: Context) -> SegmentedSoFar:
         frame = pair.current
         return segmented_so_far(self._mask.Eval(context), frame.depth, frame.intrinsics)
 
-    def _offset_from(self, push: Push) -> NDArray[np.float64]:
+    def _offset_from(self, path: PushPath) -> NDArray[np.float64]:
         """How far the arm's command is from where a push's path begins."""
-        if push.path is None:
-            raise ValueError("the push has no path; give it one with plan_push_path")
-        offset = self._q_observe - push.path.position(0.0)
+        offset = self._q_observe - path.position(0.0)
         if np.abs(offset).max() > self._parameters.largest_jump:
             raise ValueError(
                 f"the push's path begins {np.abs(offset).max():.3f} rad away from the observation "
                 f"posture, at most {self._parameters.largest_jump} is allowed; plan from `position`"
             )
         return offset
+
+
+def _after_motion(memory: _Memory, attempt: _Attempt | None, end: float, time: float) -> _Memory:
+    """The arm observes once its motion is over; a push counts as made, also one that was given up."""
+    if time < end:
+        return memory
+    after = replace(memory, doing=_Observing(), end_time=time)
+    if attempt is None:
+        return after
+    return replace(after, interaction_step=memory.interaction_step + 1, unjudged=attempt)
 
 
 def _enough(decision: Decision) -> Decision:
