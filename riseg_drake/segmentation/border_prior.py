@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.segmentation.border_pixels import border_pixels
 from riseg_drake.segmentation.keyframe import Keyframe
 
 
@@ -20,8 +21,6 @@ class BorderPriorParameters:
 
     smooth: float = 2.5
     """Of a border without any cue."""
-    step: float = 0.0
-    """For each mm of height across the border, up to 10."""
     dent: float = -0.2
     """For each mm that the border lies below the mean of its two sides, up to 10."""
     valley: float = -0.6
@@ -36,56 +35,42 @@ class BorderPriorParameters:
     """... and no less than that, nats."""
 
 
-_NEAR, _FAR = 2, 4
-"""Pixels from the border at which heights are compared."""
+_FAR = 4
+"""Pixels from the border at which heights are compared with its own."""
 
 
 def border_prior(keyframe: Keyframe, parameters: BorderPriorParameters) -> NDArray[np.float64]:
     """[M], log-odds that the two sides of each border are one body, by the keyframe alone."""
     cues = border_cues(keyframe)
-    weight = np.array(
-        [parameters.step, parameters.dent, parameters.valley, parameters.color, parameters.hole], np.float64
-    )
+    weight = np.array([parameters.dent, parameters.valley, parameters.color, parameters.hole], np.float64)
     odds = np.clip(parameters.smooth + cues @ weight, parameters.least, parameters.most)
     # Of what may go on behind something the still picture says nothing.
     return np.where(keyframe.superpixels.behind, 0.0, odds)
 
 
 def border_cues(keyframe: Keyframe) -> NDArray[np.float64]:
-    """[M, 5]: step, dent and valley, mm; colour difference, gray levels; share without depth, beyond that of
-    both sides; means along each border, saturated."""
+    """[M, 4]: dent and valley, mm; colour difference, gray levels; share without depth, beyond that of both
+    sides; means along each border, saturated."""
     region, count, borders = keyframe.region, keyframe.count, keyframe.borders
     label = keyframe.superpixels.label
     height = cv2.medianBlur(keyframe.height, 5)
     color = cv2.GaussianBlur(keyframe.frame.color[region], (0, 0), 1.0).astype(np.float32)
     measured = keyframe.frame.depth[region] > 0
-    code = borders[:, 0] * count + borders[:, 1]  # rising, as the superpixels list them
-    sums, pixels = np.zeros((5, len(borders))), np.zeros(len(borders))
-    for axis in (0, 1):
-        a, b = (label[:-1], label[1:]) if axis == 0 else (label[:, :-1], label[:, 1:])
-        vu = np.stack(np.nonzero((a != b) & (a >= 0) & (b >= 0)))
-        low, high = np.minimum(a[*vu], b[*vu]), np.maximum(a[*vu], b[*vu])
-        border = np.searchsorted(code, low * count + high)
-
-        def beside(image: NDArray, offset: int, vu: NDArray = vu, axis: int = axis) -> NDArray:
-            place = vu.copy()
-            place[axis] = np.clip(place[axis] + offset, 0, image.shape[axis] - 1)
-            return image[*place]
-
-        floor = np.minimum(beside(height, 0), beside(height, 1))
-        before, after = beside(height, -_FAR), beside(height, 1 + _FAR)
+    sums, pixels = np.zeros((4, len(borders))), np.zeros(len(borders))
+    for places in border_pixels(keyframe.superpixels):
+        floor = np.minimum(places.beside(height, 0), places.beside(height, 1))
+        before, after = places.beside(height, -_FAR), places.beside(height, 1 + _FAR)
         cues = (
-            1e3 * np.abs(beside(height, -_NEAR) - beside(height, 1 + _NEAR)),
             1e3 * ((before + after) / 2 - floor),
             1e3 * (np.minimum(before, after) - floor),
-            np.abs(beside(color, -1) - beside(color, 2)).max(-1),
-            ~(beside(measured, 0) & beside(measured, 1)),
+            np.abs(places.beside(color, -1) - places.beside(color, 2)).max(-1),
+            ~(places.beside(measured, 0) & places.beside(measured, 1)),
         )
         for total, cue in zip(sums, cues, strict=True):
-            total += np.bincount(border, np.maximum(cue, 0), len(borders))
-        pixels += np.bincount(border, minlength=len(borders))
+            total += np.bincount(places.border, np.maximum(cue, 0), len(borders))
+        pixels += np.bincount(places.border, minlength=len(borders))
     means = (sums / np.maximum(pixels, 1)).T
     # What is dark has holes everywhere, of which none tells where it ends.
     without = np.bincount(label[label >= 0], ~measured[label >= 0], count) / np.maximum(keyframe.area, 1)
     means[:, -1] = np.maximum(means[:, -1] - without[borders].mean(1), 0)
-    return np.minimum(means, [10.0, 10.0, 10.0, 60.0, 1.0])
+    return np.minimum(means, [10.0, 10.0, 60.0, 1.0])

@@ -19,6 +19,7 @@ from riseg_drake.segmentation.superpixels import (
     superpixels,
     with_occlusions,
 )
+from riseg_drake.segmentation.support import may_lie_on
 from riseg_drake.segmentation.surface import SurfacePixels, surface_pixels
 
 _BOUNDARY = np.ones((5, 5), np.uint8)
@@ -51,6 +52,8 @@ class Keyframe(Immutable):
     """[h, w] of the region, m above the table; what stands there without depth is as high as what is near."""
     superpixels: Superpixels
     """Of the region."""
+    over: NDArray[np.bool_]
+    """[M], borders at which one side may lie on the other."""
     area: NDArray[np.intp]
     """[N], pixels of each superpixel."""
     points: SurfacePixels
@@ -124,7 +127,8 @@ def make_keyframe(
     cut = superpixels(frame.color[region], height, above.mask[region], size)
     if bodies is not None:
         cut = split_superpixels(cut, bodies[region])
-    cut = with_occlusions(cut, cv2.medianBlur(height, 5), parameters.behind)
+    smooth = cv2.medianBlur(height, 5)
+    cut = with_occlusions(cut, smooth, parameters.behind)
     owner = np.full(above.mask.shape, -1, np.intp)
     owner[region] = cut.label
     variance = gray_variance(frame.gradient_squared, noise)
@@ -139,6 +143,7 @@ def make_keyframe(
         region=region,
         height=height,
         superpixels=cut,
+        over=may_lie_on(cut, smooth),
         area=np.bincount(cut.label[cut.label >= 0], minlength=cut.count),
         points=points,
         owner=owner[v, u],

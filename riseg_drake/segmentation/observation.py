@@ -2,7 +2,8 @@
 
 Superpixels a, b have the motion k, of the share pi_k of what stands there, with the probabilities q_a(k),
 q_b(k). Those of one body have the same. If a has k, a neighbour that is another body has l with the probability
-rho(l | k): what moves pushes it along now and then, what stands still mostly stands beside what does so, too.
+rho(l | k): what moves pushes it along now and then, what lies on it mostly goes along, what stands still mostly
+stands beside what does so, too. All other motions are as likely as they are common.
 
     evidence(a, b) = log( sum_k q_a(k) q_b(k) / pi_k ) - log( sum_k,l q_a(k) rho(l | k) q_b(l) / pi_l )
 
@@ -39,6 +40,8 @@ class ObservationParameters:
     another view gloss and wrong depth look like a motion over larger patches."""
     along: float = 0.2
     """rho(k | k) of a motion: probability with which a thing pushes its neighbour along as if they were one."""
+    carried: float = 0.6
+    """The same where one may lie on the other."""
     stays: float = 0.8
     """rho(k | k) of standing still: with which the neighbour of what stands still stands still, too."""
     still_share: float = 0.5
@@ -103,11 +106,12 @@ def observe(
     q = motion_posterior(nats, share, parameters.outlier)
     focal_length, p_KQ = compared.frame.intrinsics.fx, keyframe.edges.p_C0Q[::10]
     spans = [flow_difference(p_KQ, X, np.eye(4), focal_length) if len(p_KQ) else 0.0 for X in motions_K[needed]]
+    along = np.where(keyframe.over, parameters.carried, parameters.along)
     return Observation(
         motions_K=motions_K[needed],
         motion=motion,
         nats=nats,
-        evidence=bond_evidence(q, share, keyframe.borders, parameters.stays, parameters.along),
+        evidence=bond_evidence(q, share, keyframe.borders, parameters.stays, along),
         span=np.array(spans)[motion],
     )
 
@@ -148,21 +152,22 @@ def bond_evidence(
     share: NDArray[np.float64],
     borders: NDArray[np.intp],
     stays: float,
-    along: float,
+    along: float | NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """[M], log-odds that both sides of borders [M, 2] are one body, as above.
 
     `q` [G, N] is how likely each motion is each superpixel's own, `share` [G] how common each is, `stays` and
-    `along` the probabilities with which another body does as its neighbour that stands still, or moves.
+    `along`, [M] or the same for all, the probabilities with which another body does as its neighbour that
+    stands still, or moves.
     """
-    a, b = borders.T
-    agreement = (q[:, a] * q[:, b] / share[:, None]).sum(0)
-    same = np.append(stays, np.full(len(share) - 1, along))
-    other = np.where(np.eye(len(share), dtype=bool), 0.0, share)
-    rho = np.diag(same) + (1 - same)[:, None] * other / np.maximum(other.sum(1, keepdims=True), 1e-12)
-    chance = rho @ (q / share[:, None])  # [G, N]
-    by_chance = ((q[:, a] * chance[:, b]).sum(0) + (q[:, b] * chance[:, a]).sum(0)) / 2
-    return np.log(agreement / by_chance)
+    q_a, q_b = q[:, borders[:, 0]], q[:, borders[:, 1]]
+    pi = share[:, None]
+    alike = q_a * q_b / pi
+    rho = np.broadcast_to(along, alike.shape).copy()
+    rho[0] = stays
+    unlike = (q_a * (1 - q_b) + q_b * (1 - q_a)) / 2 / np.maximum(1 - pi, 1e-12)
+    by_chance: NDArray[np.float64] = (rho * alike + (1 - rho) * unlike).sum(0)
+    return np.log(alike.sum(0) / by_chance)
 
 
 def _fewest_motions(

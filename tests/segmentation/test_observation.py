@@ -36,6 +36,32 @@ def test_standing_still_together_says_little_and_moving_together_more_however_co
     assert evidence_between(moves, share) == pytest.approx([np.log(1 / ALONG)])
 
 
+def test_what_may_lie_on_its_neighbour_tells_less_by_going_with_it_and_as_much_by_standing_still():
+    still, moves = np.zeros((2, 2)), np.zeros((2, 2))
+    still[0] = moves[1] = 1.0
+    borders, along = np.array([[0, 1], [0, 1]]), np.array([0.1, 0.6])
+    together = bond_evidence(moves, SHARE, borders, STAYS, along)
+    assert together == pytest.approx(np.log([1 / 0.1, 1 / 0.6]))
+    assert bond_evidence(still, SHARE, borders, STAYS, along) == pytest.approx([np.log(1 / STAYS)] * 2)
+
+
+def test_evidence_is_the_formula_s_for_all_pairs_of_motions():
+    rng = np.random.default_rng(4)
+    share, q, stays, along = rng.dirichlet(np.ones(4)), rng.dirichlet(np.ones(4), 2).T, 0.7, 0.3
+    same = [stays, along, along, along]
+    alike = sum(q[k, 0] * q[k, 1] / share[k] for k in range(4))
+
+    def by_chance(a, b):
+        return sum(
+            q[k, a] * (same[k] if k == j else (1 - same[k]) * share[j] / (1 - share[k])) * q[j, b] / share[j]
+            for k in range(4)
+            for j in range(4)
+        )
+
+    expected = np.log(alike / ((by_chance(0, 1) + by_chance(1, 0)) / 2))
+    assert bond_evidence(q, share, np.array([[0, 1]]), stays, along) == pytest.approx([expected])
+
+
 def test_moving_apart_is_as_bad_as_outliers_allow():
     # Costs say nothing with a probability of 2 %: q = (0.98 + 0.016, 0.004) and (0.016, 0.98 + 0.004).
     nats = np.array([[0.0, 100.0], [100.0, 0.0]])
