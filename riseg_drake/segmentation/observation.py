@@ -40,10 +40,9 @@ class ObservationParameters:
     another view gloss and wrong depth look like a motion over larger patches."""
     along: float = 0.2
     """rho(k | k) of a motion: probability with which a thing pushes its neighbour along as if they were one."""
-    carried: float = 0.6
-    """The same where one may lie on the other."""
     stays: float = 0.8
-    """rho(k | k) of standing still: with which the neighbour of what stands still stands still, too."""
+    """rho(k | k) of standing still, with which the neighbour of what stands still stands still, too; and of any
+    motion where one of two may lie on the other."""
     still_share: float = 0.5
     """Least share of standing still: most does."""
     still: float = 0.5
@@ -106,7 +105,7 @@ def observe(
     q = motion_posterior(nats, share, parameters.outlier)
     focal_length, p_KQ = compared.frame.intrinsics.fx, keyframe.edges.p_C0Q[::10]
     spans = [flow_difference(p_KQ, X, np.eye(4), focal_length) if len(p_KQ) else 0.0 for X in motions_K[needed]]
-    along = np.where(keyframe.over, parameters.carried, parameters.along)
+    along = np.where(keyframe.over, parameters.stays, parameters.along)
     return Observation(
         motions_K=motions_K[needed],
         motion=motion,
