@@ -20,7 +20,7 @@ from riseg_drake.pushing.objects_to_segment import ObjectsToSegmentParameters, t
 from riseg_drake.pushing.push import NO_PUSH, Push
 from riseg_drake.pushing.pusher import Pusher
 from riseg_drake.pushing.table_map import TableMap, TableMapParameters
-from riseg_drake.pushing.tried_pushes import TriedPush, times_pushed
+from riseg_drake.pushing.tried_pushes import KnownScene, times_pushed
 from riseg_drake.pushing.validity import ValidityParameters, is_valid_push, share_after_push
 
 ALIKE_DISTANCE = 0.010
@@ -49,26 +49,21 @@ class FindActionParameters:
 
 
 def find_action(
-    table: TableMap,
+    known: KnownScene,
     rng: np.random.Generator,
     parameters: FindActionParameters | None = None,
-    *,
-    tried: Sequence[TriedPush] = (),
-    heading_W: NDArray | None = None,
     plan_path: PlanPath | None = None,
 ) -> Decision:
     """FindAction: the best valid push that the arm can do, or why there is none.
 
     Args:
-        table: line 1, objMask on the map, with binL (line 2) beside it.
+        known: the map, and what was tried.
         rng: for the clustering.
         parameters: the defaults if None.
-        tried: pushes made so far.
-        heading_W: [2], where the tool's +x points now; turning away from it costs time.
         plan_path: the arm's path for a push, or the stage that it cannot do. Without it every push counts
             as reachable and comes without a path.
     """
-    parameters = parameters or FindActionParameters()
+    parameters, table = parameters or FindActionParameters(), known.table
     unmoved, doubtful = things_to_push(table, parameters.to_segment)  # line 3
     doubtful_area = float(np.count_nonzero(doubtful)) * table.cell_area
     area = float(np.count_nonzero(unmoved)) * table.cell_area + doubtful_area
@@ -79,7 +74,7 @@ def find_action(
     candidates = 0
     # What has never moved comes before what is in doubt; alone before with others; what lies on something else
     # before both, as it has moved with it.
-    known = replace(table, segmented=table.segmented | (doubtful > 0), doubtful=None)
+    all_found = replace(table, segmented=table.segmented | (doubtful > 0), doubtful=None)
     on_top = raised(
         table,
         doubtful,
@@ -88,7 +83,7 @@ def find_action(
         parameters.levels,
     )
     stages = chain(
-        ((unmoved, known, True), (unmoved, known, False)),
+        ((unmoved, all_found, True), (unmoved, all_found, False)),
         ((upper, above, True) for upper, above in on_top),
         ((doubtful > 0, table, True), (doubtful > 0, table, False)),
     )
@@ -96,7 +91,7 @@ def find_action(
         if not to_segment.any() or not (alone or parameters.validity.with_others):
             continue
         for clusters in find_clusters(to_segment, scene, parameters.clusters, rng, scene.doubtful):  # line 6
-            pushes, failed = valid_pushes(clusters, scene, tried, heading_W, parameters, alone=alone)
+            pushes, failed = valid_pushes(clusters, replace(known, table=scene), parameters, alone=alone)
             push = search.best(pushes)
             if push is not None:
                 return Decision(push, unsettled_area=area, doubtful_area=doubtful_area)  # lines 11, 12
@@ -145,18 +140,16 @@ class _PathSearch:
 
 def valid_pushes(
     clusters: Sequence[Cluster],
-    table: TableMap,
-    tried: Sequence[TriedPush],
-    heading_W: NDArray | None,
+    known: KnownScene,
     parameters: FindActionParameters,
     *,
     alone: bool = True,
 ) -> tuple[list[Push], dict[Criterion, NDArray[np.bool_]]]:
     """The valid pushes of all clusters, best first (lines 7 to 10), and which candidates [N] fail what.
 
-    `heading_W` is the direction [2] in which the pusher points now; None: all are alike. Not `alone`, a
-    cluster is pushed with all that it touches.
+    Not `alone`, a cluster is pushed with all that it touches.
     """
+    table = known.table
     pushes: list[Push] = []
     failed: dict[Criterion, list[NDArray]] = {criterion: [] for criterion in Criterion}
     for cluster in clusters:  # line 8
@@ -165,7 +158,7 @@ def valid_pushes(
         if not len(B):
             continue
         valid, fails = valid_pushes_of(  # lines 9, 10
-            B, cluster, pushed, table, tried, heading_W, parameters, alone=alone
+            B, cluster, pushed, known, parameters, alone=alone
         )
         pushes += valid
         for criterion, which in fails.items():
@@ -179,9 +172,7 @@ def valid_pushes_of(
     boundary_W: NDArray,
     cluster: Cluster,
     pushed: NDArray[np.bool_],
-    table: TableMap,
-    tried: Sequence[TriedPush],
-    heading_W: NDArray | None,
+    known: KnownScene,
     parameters: FindActionParameters,
     *,
     alone: bool,
@@ -193,14 +184,14 @@ def valid_pushes_of(
     else, low enough but not too close to the table, and nothing is driven out of the work area. Not `alone`,
     that is more than the cluster, which then need not move alone.
     """
-    validity, pusher = parameters.validity, parameters.pusher
+    validity, pusher, table = parameters.validity, parameters.pusher, known.table
     center_W, P = cluster.center_W, cluster.cells
     direction_W = center_W - boundary_W
     direction_W /= np.linalg.norm(direction_W, axis=1, keepdims=True)
     in_doubt = table.doubtful is not None or table.carrying is not None
     least = parameters.gain.least if in_doubt else 0.0
     thing = P if table.doubtful is None else table.doubtful == table.doubtful[P][0]
-    tries = times_pushed(thing, table, tried, validity.d_push)
+    tries = times_pushed(thing, table, known.tried, validity.d_push)
     if most_to_expect(np.count_nonzero(P) * table.cell_area, tries, parameters.gain) <= least:
         # No other criterion needs to be asked, which takes most of the time of a decision.
         none = np.zeros(len(boundary_W), bool)
@@ -209,10 +200,7 @@ def valid_pushes_of(
         boundary_W, direction_W, pushed, table, pusher, validity, target=None if alone else P
     )
     is_valid = is_valid_push(contacts.b_W, direction_W, center_W, P, table, pusher, validity)
-    gain = expected_gain(
-        contacts, direction_W, is_valid.overlap, P, table,
-        tried, tries, heading_W, validity, parameters.gain,
-    )  # fmt: skip
+    gain = expected_gain(contacts, direction_W, is_valid.overlap, P, tries, known, validity, parameters.gain)
     passed = {
         Criterion.CENTER_ON_OBJECT: is_valid.center_on_object,
         Criterion.ACCESSIBLE: is_valid.accessible,

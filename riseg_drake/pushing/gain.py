@@ -5,15 +5,13 @@ settle: the chance that its target is an object, times the chances of what must 
 by itself. Chances multiply, so no weights are needed to trade one against another.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.pushing.contact import Contacts
-from riseg_drake.pushing.table_map import TableMap
-from riseg_drake.pushing.tried_pushes import TriedPush, novelty
+from riseg_drake.pushing.tried_pushes import KnownScene, novelty
 from riseg_drake.pushing.validity import ValidityParameters, overlap_after_push
 
 
@@ -52,18 +50,16 @@ def expected_gain(
     direction_W: NDArray,
     overlap: NDArray,
     cluster: NDArray[np.bool_],
-    table: TableMap,
-    tried: Sequence[TriedPush],
     tries: int,
-    heading_W: NDArray | None,
+    known: KnownScene,
     validity: ValidityParameters,
     parameters: GainParameters,
 ) -> NDArray[np.float64]:
     """Objects [N] that N candidates of one cluster can be expected to settle; 0 for those to be refused.
 
-    `overlap` [N] is |isect| / |P|, `tries` how often the cluster was pushed before, and `heading_W` [2] where
-    the camera's "up" points now (None if turning costs nothing).
+    `overlap` [N] is |isect| / |P|, and `tries` how often the cluster was pushed before.
     """
+    table, tried = known.table, known.tried
     P = table.points(cluster)
     along = P @ direction_W.T  # [M, N]
     extent = along.max(axis=0) - along.min(axis=0) + table.cell
@@ -81,8 +77,8 @@ def expected_gain(
         / np.maximum(top / extent, 1.0)  # tall narrow things topple
         * new.min(axis=1, initial=1.0)
     )  # fmt: skip
-    if heading_W is not None:
-        turn = np.arccos(np.clip(direction_W @ heading_W, -1.0, 1.0))
+    if known.heading_W is not None:
+        turn = np.arccos(np.clip(direction_W @ known.heading_W, -1.0, 1.0))
         gain *= 1.0 - parameters.turning * turn / np.pi
     in_vain = new[:, [not push.changed for push in tried]].min(axis=1, initial=1.0)
     gain[in_vain < parameters.same] = 0.0

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +12,8 @@ from riseg_drake.pushing.decision import Decision, PathStage
 from riseg_drake.pushing.find_action import FindActionParameters, find_action
 from riseg_drake.pushing.push import Push
 from riseg_drake.pushing.push_path import PushPathParameters, plan_push_path
-from riseg_drake.pushing.table_map import map_table
-from riseg_drake.pushing.tried_pushes import TriedPush
+from riseg_drake.pushing.table_map import SeenTable, map_table
+from riseg_drake.pushing.tried_pushes import KnownScene, TriedPush
 from riseg_drake.robot.kinematics import PandaKinematics
 
 
@@ -24,26 +23,6 @@ class PushPlanningParameters:
 
     action: FindActionParameters = field(default_factory=FindActionParameters)
     path: PushPathParameters = field(default_factory=PushPathParameters)
-
-
-@runtime_checkable
-class SeenTable(Protocol):
-    """GetObjsAboveTable of one frame (Alg. 3, line 1), by whatever tells what stands on the table."""
-
-    @property
-    def mask(self) -> NDArray[np.bool_]:
-        """[H, W], objMask."""
-        ...
-
-    @property
-    def height(self) -> NDArray[np.floating]:
-        """[H, W], m above the table."""
-        ...
-
-    @property
-    def plane_W(self) -> NDArray[np.float64]:
-        """[4], the table top, n . p_WQ + d is the height of Q."""
-        ...
 
 
 def plan_push(
@@ -72,28 +51,12 @@ def plan_push(
             them from it.
     """
     parameters = parameters or PushPlanningParameters()
-    table = map_table(
-        frame.depth,
-        frame.intrinsics,
-        frame.X_WC,
-        above.mask,
-        above.height,
-        mask,
-        above.plane_W,
-        robot=frame.robot,
-        parameters=parameters.action.table,
-        found=found,
-    )
     ahead_W = kinematics.X_WE(q_observe)[:2, 0]
+    known = KnownScene(
+        map_table(frame, above, mask, parameters.action.table, found), tried, ahead_W / np.linalg.norm(ahead_W)
+    )
 
     def path_of(push: Push) -> PushPath | PathStage:
         return plan_push_path(push, kinematics, q_observe, parameters.action.pusher, parameters.path)
 
-    return find_action(
-        table,
-        rng,
-        parameters.action,
-        tried=tried,
-        heading_W=ahead_W / np.linalg.norm(ahead_W),
-        plan_path=path_of,
-    )
+    return find_action(known, rng, parameters.action, path_of)

@@ -8,12 +8,14 @@ and j along W's x; points on the table are p_WQ = (x, y) in metres.
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Protocol, runtime_checkable
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import Intrinsics, rays
+from riseg_drake.geometry.camera import rays
+from riseg_drake.geometry.rgbd import Frame
 
 
 @dataclass
@@ -26,6 +28,26 @@ class TableMapParameters:
     """What the map shows around the work area, m: the pusher may start outside of it."""
     cell: float = 0.002
     """Edge of a cell, m; enlarged where the pixels are coarser than that."""
+
+
+@runtime_checkable
+class SeenTable(Protocol):
+    """GetObjsAboveTable of one frame (Alg. 3, line 1), by whatever tells what stands on the table."""
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """[H, W], objMask."""
+        ...
+
+    @property
+    def height(self) -> NDArray[np.floating]:
+        """[H, W], m above the table."""
+        ...
+
+    @property
+    def plane_W(self) -> NDArray[np.float64]:
+        """[4], the table top, n . p_WQ + d is the height of Q."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -102,33 +124,24 @@ def binarize_mask(mask: NDArray) -> NDArray[np.bool_]:
 
 
 def map_table(
-    depth: NDArray,
-    intrinsics: Intrinsics,
-    X_WC: NDArray,
-    objects: NDArray[np.bool_],
-    height: NDArray,
+    frame: Frame,
+    above: SeenTable,
     mask: NDArray,
-    plane_W: NDArray,
-    robot: NDArray[np.bool_] | None = None,
     parameters: TableMapParameters | None = None,
     found: NDArray | None = None,
 ) -> TableMap:
     """The map of what one image shows.
 
     Args:
-        depth: [H, W], metres, 0 = invalid.
-        intrinsics: of the camera.
-        X_WC: [4, 4], pose of the camera.
-        objects: [H, W], pixels above the table (objMask in the image).
-        height: [H, W], height of each pixel's point above the table, m.
+        frame: the image; the robot's own pixels are left out.
+        above: what stands on the table there.
         mask: [H, W], L_t, the object id of each pixel, 0 = none yet, or none for sure.
-        plane_W: [4], the table top.
-        robot: [H, W], pixels to leave out because the robot covers them.
         parameters: the defaults if None.
         found: [H, W], L_t with the objects in doubt; None where nobody tells.
     """
     parameters = parameters or TableMapParameters()
-    valid = depth > 0 if robot is None else (depth > 0) & ~robot
+    depth, intrinsics, X_WC, height = frame.depth, frame.intrinsics, frame.X_WC, above.height
+    valid = (depth > 0) & ~frame.robot
     pixels = np.flatnonzero(valid)
     if len(pixels):
         pixel_size = 1.5 * float(np.median(depth.reshape(-1)[pixels])) / min(intrinsics.fx, intrinsics.fy)
@@ -150,8 +163,8 @@ def map_table(
 
     seen = np.zeros(rows * columns, bool)
     seen[cells] = True
-    above = objects.reshape(-1)[pixels] & (height.reshape(-1)[pixels] > 0)
-    pixels, cells = pixels[above], cells[above]
+    raised = above.mask.reshape(-1)[pixels] & (height.reshape(-1)[pixels] > 0)
+    pixels, cells = pixels[raised], cells[raised]
     # Written from the lowest to the highest, so that the highest point of a cell remains.
     rising = np.argsort(height.reshape(-1)[pixels], kind="stable")
     pixels, cells = pixels[rising], cells[rising]
@@ -173,6 +186,6 @@ def map_table(
         height=top.reshape(shape),
         seen=seen.reshape(shape),
         work_area_W=(x_min, x_max, y_min, y_max),
-        plane_W=np.asarray(plane_W, float),
+        plane_W=np.asarray(above.plane_W, float),
         doubtful=None if found is None else doubtful.reshape(shape),
     )

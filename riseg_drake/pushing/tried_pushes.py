@@ -25,6 +25,19 @@ class TriedPush:
     """Whether the number of segmented objects or their area changed."""
 
 
+@dataclass(frozen=True)
+class KnownScene:
+    """What a push is chosen by."""
+
+    table: TableMap
+    """objMask on the map, with binL beside it (Alg. 3, lines 1 and 2)."""
+    tried: Sequence[TriedPush] = ()
+    """Pushes made so far."""
+    heading_W: NDArray[np.float64] | None = None
+    """[2], where the tool's +x, the camera's "up", points now; turning away from it costs time. None: all
+    directions are alike."""
+
+
 def times_pushed(thing: NDArray[np.bool_], table: TableMap, tried: Sequence[TriedPush], d_push: float) -> int:
     """How many of the pushes made so far ended at a thing, as cells [rows, columns].
 

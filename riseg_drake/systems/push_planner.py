@@ -6,7 +6,8 @@ from pydrake.systems.framework import Context, LeafSystem
 
 from riseg_drake.geometry.rgbd import NO_MASK, NO_PAIR
 from riseg_drake.pushing.decision import UNDECIDED
-from riseg_drake.pushing.push_planning import PushPlanningParameters, SeenTable, plan_push
+from riseg_drake.pushing.push_planning import PushPlanningParameters, plan_push
+from riseg_drake.pushing.table_map import SeenTable
 from riseg_drake.pushing.tried_pushes import TriedPush
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE

@@ -4,11 +4,11 @@ import pytest
 from riseg_drake.pushing.decision import Criterion, Ending, PathStage
 from riseg_drake.pushing.find_action import FindActionParameters, find_action
 from riseg_drake.pushing.push import NO_PUSH
-from riseg_drake.pushing.tried_pushes import TriedPush
+from riseg_drake.pushing.tried_pushes import KnownScene, TriedPush
 
 
-def decide(table, seed=0, **options):
-    return find_action(table, np.random.default_rng(seed), **options)
+def decide(table, seed=0, tried=(), heading_W=None, **options):
+    return find_action(KnownScene(table, tried, heading_W), np.random.default_rng(seed), **options)
 
 
 def act(table, seed=0, **options):

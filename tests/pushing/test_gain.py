@@ -6,7 +6,7 @@ import pytest
 from riseg_drake.pushing.contact import find_contacts
 from riseg_drake.pushing.gain import GainParameters, expected_gain
 from riseg_drake.pushing.pusher import Pusher
-from riseg_drake.pushing.tried_pushes import TriedPush
+from riseg_drake.pushing.tried_pushes import KnownScene, TriedPush
 from riseg_drake.pushing.validity import ValidityParameters, overlap_after_push
 
 ALONG_X = np.array([[1.0, 0.0]])
@@ -25,7 +25,14 @@ def gain_of(drawn, cluster, tried=(), tries=0, heading_W=None):
     contacts = find_contacts(np.array([[0.5, 0.0]]), ALONG_X, cluster, table, Pusher(), validity)
     overlap = overlap_after_push(ALONG_X, cluster, table, validity.d_push)
     (gain,) = expected_gain(
-        contacts, ALONG_X, overlap, cluster, table, tried, tries, heading_W, validity, GainParameters()
+        contacts,
+        ALONG_X,
+        overlap,
+        cluster,
+        tries,
+        KnownScene(table, tried, heading_W),
+        validity,
+        GainParameters(),
     )
     return gain
 

@@ -11,6 +11,7 @@ from riseg_drake.pushing.find_action import find_action
 from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.pushing.push_path import PushPathParameters, plan_push_path
 from riseg_drake.pushing.pusher import Pusher
+from riseg_drake.pushing.tried_pushes import KnownScene
 from riseg_drake.robot.kinematics import observation_posture, observe_pose
 from riseg_drake.robot.limits import PANDA_LIMITS
 
@@ -22,7 +23,7 @@ def q_observe(panda):
 
 def planned(drawn, panda, q_observe):
     push = find_action(
-        drawn.map(),
+        KnownScene(drawn.map()),
         np.random.default_rng(0),
         plan_path=lambda push: plan_push_path(push, panda, q_observe, Pusher()),
     ).push

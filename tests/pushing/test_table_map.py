@@ -1,6 +1,9 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pushing.table_map import TableMapParameters, binarize_mask, map_table
 
 FLAT = np.array([0.0, 0.0, 1.0, 0.0])
@@ -8,9 +11,17 @@ FLAT = np.array([0.0, 0.0, 1.0, 0.0])
 
 def map_of(view, mask=None, robot=None, parameters=None):
     mask = np.zeros_like(view.number) if mask is None else mask
-    return map_table(
-        view.depth, view.intrinsics, view.X_WC, view.objects, view.height, mask, FLAT, robot, parameters
-    )
+    return map_table(frame_of(view, robot), above_in(view, FLAT), mask, parameters)
+
+
+def frame_of(view, robot=None):
+    robot = np.zeros(view.depth.shape, bool) if robot is None else robot
+    color = np.zeros((*view.depth.shape, 3), np.uint8)
+    return Frame(0, 0.0, view.intrinsics, color, view.depth, view.X_WC, robot)
+
+
+def above_in(view, plane_W):
+    return SimpleNamespace(mask=view.objects, height=view.height, plane_W=plane_W)
 
 
 def test_binarized_mask_is_true_where_there_is_an_id():
@@ -69,5 +80,5 @@ def test_cells_are_no_finer_than_the_pixels(view):
 def test_ground_follows_a_sloped_table(view):
     seen = view([])
     slope = np.array([-0.1, 0.0, 1.0, -0.02]) / np.hypot(1, 0.1)
-    table = map_table(seen.depth, seen.intrinsics, seen.X_WC, seen.objects, seen.height, seen.number, slope)
+    table = map_table(frame_of(seen), above_in(seen, slope), seen.number)
     assert table.ground(np.array([0.5, 0.3])) == pytest.approx(0.07)

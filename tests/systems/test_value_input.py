@@ -8,7 +8,7 @@ from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import Context, LeafSystem
 
 from riseg_drake.geometry.rgbd import NO_PAIR, FramePair
-from riseg_drake.pushing.push_planning import SeenTable
+from riseg_drake.pushing.table_map import SeenTable
 from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
 from riseg_drake.systems.expected_flow import ExpectedFlow
 from riseg_drake.systems.value_input import ValueInput
