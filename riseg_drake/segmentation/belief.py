@@ -182,15 +182,15 @@ def next_belief(
     if seen is not None:
         evidence = np.clip(evidence + seen.evidence, -parameters.most, parameters.most)
     body = np.where(known, bodies.body[source], _most_seen(new, np.where(carried == 0, ids, 0)))
-    moved = known & (bodies.motion[source] > 0)
     prior = border_prior(new, parameters.prior)
-    evidence = _carried_evidence(old, belief.prior, evidence, new, prior, source, body, moved, parameters)
+    origin = Origin(source, body, moved=known & (bodies.motion[source] > 0))
+    evidence = carried_evidence(replace(belief, evidence=evidence), new, prior, origin, parameters)
     part = partition(new, prior + evidence, parameters.partition)
     return Belief(
         keyframe=new,
         prior=prior,
         evidence=evidence,
-        body=_completed(body, known, part, new.area),
+        body=completed(body, known, part, new.area),
         next_id=bodies.next_id,
         part=part,
         finer=_finer(new, prior + evidence, parameters),
@@ -215,7 +215,7 @@ def rebased(then: Bodies, now: Bodies, old: Keyframe, following: Belief) -> Bodi
     return Bodies(following.body, motion, np.array(motions), following.next_id)
 
 
-def _completed(
+def completed(
     body: NDArray[np.intp], known: NDArray[np.bool_], part: NDArray[np.intp], area: NDArray[np.intp]
 ) -> NDArray[np.intp]:
     """Ids [N], of which those that were not `known` [N] before take that of most of their part."""
@@ -230,31 +230,41 @@ def _finer(keyframe: Keyframe, bond: NDArray[np.float64], parameters: BeliefPara
     return np.array(parts, np.intp).reshape(-1, keyframe.count)
 
 
-def _carried_evidence(
-    old: Keyframe,
-    old_prior: NDArray[np.float64],
-    old_evidence: NDArray[np.float64],
+@dataclass(frozen=True)
+class Origin:
+    """Of the N superpixels of a new keyframe, what they were in the old one."""
+
+    source: NDArray[np.intp]
+    """[N], superpixel of the old keyframe; -1 where it shows none."""
+    body: NDArray[np.intp]
+    """[N], ids."""
+    moved: NDArray[np.bool_]
+    """[N], whether it has moved since."""
+
+
+def carried_evidence(
+    old: Belief,
     new: Keyframe,
     new_prior: NDArray[np.float64],
-    source: NDArray[np.intp],
-    body: NDArray[np.intp],
-    moved: NDArray[np.bool_],
+    origin: Origin,
     parameters: BeliefParameters,
 ) -> NDArray[np.float64]:
-    """Evidence [M] for the borders of the new keyframe, whose superpixels come from old ones, `source` [N].
+    """Evidence [M] for the borders of the new keyframe.
 
-    What a body uncovered that `moved` [N] away is not that body; of others that stood beside it, it may be.
+    What a body uncovered that moved away is not that body; of others that stood beside it, it may be.
     """
     a, b = new.borders.T
-    from_a, from_b = source[a], source[b]
-    code = np.minimum(from_a, from_b) * old.count + np.maximum(from_a, from_b)
-    old_code = old.borders[:, 0] * old.count + old.borders[:, 1]  # rising
+    body, moved = origin.body, origin.moved
+    from_a, from_b = origin.source[a], origin.source[b]
+    count, old_borders = old.keyframe.count, old.keyframe.borders
+    code = np.minimum(from_a, from_b) * count + np.maximum(from_a, from_b)
+    old_code = old_borders[:, 0] * count + old_borders[:, 1]  # rising
     place = np.clip(np.searchsorted(old_code, code), 0, max(len(old_code) - 1, 0))
     known = (from_a >= 0) & (from_b >= 0)
     if len(old_code):
         same_border = known & (from_a != from_b) & (old_code[place] == code)
         # A gap that was seen once is remembered when it has closed.
-        remembered = old_evidence[place] + np.minimum(old_prior[place] - new_prior, 0)
+        remembered = old.evidence[place] + np.minimum(old.prior[place] - new_prior, 0)
     else:
         same_border, remembered = np.zeros(len(a), bool), np.zeros(len(a))
     stood = ((from_a < 0) ^ (from_b < 0)) & ~moved[a] & ~moved[b]

@@ -77,6 +77,22 @@ class EvidenceParameters:
     """Remember objects that leave the view (not in the paper)."""
 
 
+@dataclass(frozen=True)
+class _Look:
+    """What Alg. 2 sees at t, and by what it judges that."""
+
+    pair: FramePair
+    above: AboveTable
+    """objMask at t."""
+    parameters: EvidenceParameters
+    bfif: BFIFParameters
+
+    @property
+    def frame(self) -> Frame:
+        """I_t."""
+        return self.pair.current
+
+
 def segment_by_evidence(
     before: Segmentation,
     pair: FramePair,
@@ -95,10 +111,10 @@ def segment_by_evidence(
         parameters: see there.
         bfif: what the groups were made with: noise of the measurements, and when two motions are one.
     """
-    frame = pair.current
+    look, frame = _Look(pair, above_1, parameters, bfif), pair.current
     if before.belief is None:
-        return _begin(before, frame, above_1, parameters, bfif)
-    now = _with_rest(before, frame, above_1, parameters, bfif)
+        return _begin(before, look)
+    now = _with_rest(before, look)
     now = replace(now, view_error=renewed_view_error(now.view_error, pair))
     belief, bodies = now.belief, _bodies_before(now)
     assert belief is not None
@@ -126,50 +142,45 @@ def segment_by_evidence(
     )
     if not deciding and now.still_since is None and frame.time - now.searched >= parameters.search_every:
         now = replace(now, searched=frame.time)
-        missing_K = missing_motion(_problem(belief, compared, above_1, parameters), candidates_K)
+        missing_K = missing_motion(_problem(belief, compared, look), candidates_K)
         candidates_K = np.concatenate([candidates_K, missing_K])
     if len(candidates_K) and not deciding:
         seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters)
-        deciding = _has_gone_far(now, frame, seen, bodies, parameters)
+        deciding = _has_gone_far(now, look, seen, bodies)
     # What the next keyframe cannot be compared with any more is looked for now.
-    leaves = bool(above_1.mask.any()) and _leaves_keyframe(belief, bodies, frame, above_1, parameters)
+    leaves = bool(above_1.mask.any()) and _leaves_keyframe(belief, bodies, look)
     deciding |= leaves
     if deciding:
-        candidates_K = search_motions(_problem(belief, compared, above_1, parameters), candidates_K)
+        candidates_K = search_motions(_problem(belief, compared, look), candidates_K)
         if len(candidates_K):
             seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters)
         else:
             bodies = standing(belief)
-    return _carried(now, pair, above_1, seen, bodies, deciding, leaves, parameters, bfif)
+    return _carried(now, look, seen, bodies, deciding=deciding, leaves=leaves)
 
 
-def _begin(
-    before: Segmentation,
-    frame: Frame,
-    above: AboveTable,
-    parameters: EvidenceParameters,
-    bfif: BFIFParameters,
-) -> Segmentation:
+def _begin(before: Segmentation, look: _Look) -> Segmentation:
     """The first keyframe, once something stands on the table."""
-    label = np.where(above.mask, UNKNOWN, np.uint16(0))
-    belief = first_belief(frame, above, bfif.noise, parameters.belief) if above.mask.any() else None
+    frame, standing_there = look.frame, look.above.mask
+    belief = None
+    if standing_there.any():
+        belief = first_belief(frame, look.above, look.bfif.noise, look.parameters.belief)
     return replace(
-        before, sequence=frame.sequence, label=label, belief=belief, frame=frame, settled=parameters.settled
+        before,
+        sequence=frame.sequence,
+        label=np.where(standing_there, UNKNOWN, np.uint16(0)),
+        belief=belief,
+        frame=frame,
+        settled=look.parameters.settled,
     )
 
 
-def _with_rest(
-    before: Segmentation,
-    frame: Frame,
-    above: AboveTable,
-    parameters: EvidenceParameters,
-    bfif: BFIFParameters,
-) -> Segmentation:
+def _with_rest(before: Segmentation, look: _Look) -> Segmentation:
     """Whether anything moves, from the last frame to this one."""
     assert before.frame is not None
-    if not is_still(before.frame, frame, above, bfif.noise, parameters.rest):
+    if not is_still(before.frame, look.frame, look.above, look.bfif.noise, look.parameters.rest):
         return replace(before, still_since=None, decided=False)
-    return replace(before, still_since=frame.time) if before.still_since is None else before
+    return replace(before, still_since=look.frame.time) if before.still_since is None else before
 
 
 def _bodies_before(now: Segmentation) -> Bodies:
@@ -189,12 +200,11 @@ def _explained(
     return bodies_of(belief, seen, before, parameters.belief)
 
 
-def _problem(
-    belief: Belief, compared: Comparison, above: AboveTable, parameters: EvidenceParameters
-) -> SearchProblem:
+def _problem(belief: Belief, compared: Comparison, look: _Look) -> SearchProblem:
+    parameters = look.parameters
     return SearchProblem(
         compared,
-        above,
+        look.above,
         np.vstack([belief.part[None], belief.finer]),
         motion_price(compared, parameters.observation),
         parameters.search,
@@ -205,17 +215,15 @@ def _problem(
 
 def _carried(
     now: Segmentation,
-    pair: FramePair,
-    above: AboveTable,
+    look: _Look,
     seen: Observation | None,
     bodies: Bodies,
+    *,
     deciding: bool,
     leaves: bool,
-    parameters: EvidenceParameters,
-    bfif: BFIFParameters,
 ) -> Segmentation:
     """The mask in the view of t, and a new keyframe where it is time for one."""
-    belief, frame = now.belief, pair.current
+    belief, pair, frame, above, parameters = now.belief, look.pair, look.frame, look.above, look.parameters
     assert belief is not None
     X_WK = belief.keyframe.frame.X_WC
     moves = {
@@ -240,26 +248,25 @@ def _carried(
     if parameters.memory:
         label_K = belief.keyframe.image_of(bodies.body.astype(np.uint16))
         memory = remember(now.memory, FramePair(belief.keyframe.frame, frame), label_K, moves)
-    following = next_belief(belief, seen, bodies, frame, above, remembered, bfif.noise, parameters.belief)
+    following = next_belief(belief, seen, bodies, frame, above, remembered, look.bfif.noise, parameters.belief)
     # The pair's reference, from which the next groups tell, may be older than the new keyframe.
     seen_so_far = {pair.reference.sequence: standing(belief), **now.bodies}
     since = {s: rebased(b, bodies, belief.keyframe, following) for s, b in seen_so_far.items()}
     return replace(now, margin=margin, belief=following, bodies=since, memory=memory, decided=decided)
 
 
-def _has_gone_far(
-    now: Segmentation, frame: Frame, seen: Observation, bodies: Bodies, parameters: EvidenceParameters
-) -> bool:
+def _has_gone_far(now: Segmentation, look: _Look, seen: Observation, bodies: Bodies) -> bool:
     """Whether something as large as a body has moved by many pixels since the keyframe, and moves on, before a
     camera that stands as it stood then: one that moves with the arm will see better at the next rest."""
     assert now.belief is not None
     assert now.frame is not None
-    keyframe, area_min = now.belief.keyframe, parameters.belief.partition.area_min
+    keyframe, parameters = now.belief.keyframe, look.parameters
     if now.still_since is not None:
         return False
-    if any(camera_span(f, frame) > parameters.rest.camera_span for f in (keyframe.frame, now.frame)):
+    if any(camera_span(f, look.frame) > parameters.rest.camera_span for f in (keyframe.frame, now.frame)):
         return False
     far = (bodies.motion > 0) & (seen.span > parameters.span)
+    area_min = parameters.belief.partition.area_min
     return bool(keyframe.area[far].sum() > area_min * keyframe.pixels_per_metre**2)
 
 
@@ -282,13 +289,11 @@ def _share_in_view(belief: Belief, bodies: Bodies, frame: Frame) -> float:
     return shown / max(1.0, len(p_KQ) * float(measured))
 
 
-def _leaves_keyframe(
-    belief: Belief, bodies: Bodies, frame: Frame, above: AboveTable, parameters: EvidenceParameters
-) -> bool:
+def _leaves_keyframe(belief: Belief, bodies: Bodies, look: _Look) -> bool:
     """Whether too much of what stands there was not to be seen in the keyframe, which shows hardly more than
     this frame: a camera that is too near to measure most of it will be back."""
-    every = (slice(2, None, 6), slice(2, None, 6))
-    standing_there = above.mask[every] & (frame.depth[every] > 0)
+    frame, every = look.frame, (slice(2, None, 6), slice(2, None, 6))
+    standing_there = look.above.mask[every] & (frame.depth[every] > 0)
     keyframe = belief.keyframe
     in_keyframe = keyframe.frame.depth[every][keyframe.above.mask[every]]
     if (frame.depth[every][standing_there] ** 2).sum() <= _AS_MUCH * (in_keyframe**2).sum():
@@ -299,4 +304,4 @@ def _leaves_keyframe(
     for X in bodies.motions_K:
         (v, u), inside = (a.T for a in pixels_of(move_points(inverse(X), p_KQ), frame.intrinsics))
         covered[inside] |= keyframe.covered[v[inside], u[inside]]
-    return bool(np.mean(~covered) > parameters.uncovered)
+    return bool(np.mean(~covered) > look.parameters.uncovered)

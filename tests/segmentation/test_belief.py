@@ -9,8 +9,9 @@ from riseg_drake.geometry.se3 import exp_se3, inverse
 from riseg_drake.segmentation.belief import (
     BeliefParameters,
     Bodies,
-    _carried_evidence,
-    _completed,
+    Origin,
+    carried_evidence,
+    completed,
     rebased,
 )
 
@@ -43,13 +44,10 @@ def test_what_a_body_uncovers_is_not_that_body_and_may_be_one_that_stood_beside_
     # 0 moved, 1 stood, 2 has never moved, 3 and 4 are uncovered.
     borders = np.array([[0, 1], [0, 3], [1, 3], [2, 3], [3, 4]])
     new = SimpleNamespace(borders=borders)
-    old = SimpleNamespace(borders=np.array([[0, 1]]), count=3)
-    source, body = np.array([0, 1, 2, -1, -1]), np.array([5, 6, 0, 0, 0])
-    moved = np.array([True, False, False, False, False])
-    prior = np.full(5, 2.0)
-    evidence = _carried_evidence(
-        old, np.array([2.0]), np.array([-7.0]), new, prior, source, body, moved, BeliefParameters(inside=2.0)
-    )
+    keyframe = SimpleNamespace(borders=np.array([[0, 1]]), count=3)
+    old = SimpleNamespace(keyframe=keyframe, prior=np.array([2.0]), evidence=np.array([-7.0]))
+    origin = Origin(source=np.array([0, 1, 2, -1, -1]), body=np.array([5, 6, 0, 0, 0]), moved=np.arange(5) == 0)
+    evidence = carried_evidence(old, new, np.full(5, 2.0), origin, BeliefParameters(inside=2.0))
     assert evidence == pytest.approx([-7.0, -4.0, 0.0, 0.0, 0.0])
 
 
@@ -58,4 +56,4 @@ def test_what_is_uncovered_takes_the_id_of_most_of_its_part_and_what_was_known_k
     body = np.array([4, 0, 0, 5, 0, 6, 0])
     known = np.array([True, True, False, True, False, True, False])
     area = np.array([30, 10, 10, 10, 11, 11, 10])
-    np.testing.assert_array_equal(_completed(body, known, part, area), [4, 0, 4, 5, 0, 6, 6])
+    np.testing.assert_array_equal(completed(body, known, part, area), [4, 0, 4, 5, 0, 6, 6])
