@@ -141,3 +141,5 @@ def test_the_test_rooms_mirror_the_package():
     tests = Path(__file__).parent
     rooms = {path.name for path in tests.iterdir() if path.is_dir() and path.name[0] not in "._"}
     assert rooms <= {*FLOORS, "docs", "models", "faults"}
+    of_app = {path.name for path in (tests / "app").iterdir() if path.is_dir() and path.name[0] not in "._"}
+    assert of_app <= {path.name for path in (PACKAGE / "app").iterdir() if path.is_dir()}

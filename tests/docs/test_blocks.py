@@ -62,17 +62,26 @@ def first_look(scenario: str | None) -> Path:
 
 
 EXECUTED: dict[str, tuple[Callable[[list[str]], list[str] | None], str]] = {
-    "run": (shortened, "one scene takes a minute; tests/app/test_run.py goes to the last push of a small one"),
-    "evaluate": (one_scene, "20 scenes take seven minutes; tests/app/test_evaluate.py has some small ones"),
+    "run": (
+        shortened,
+        "a minute; tests/app/run/test_run.py goes to the last push of a small scene",
+    ),
+    "evaluate": (
+        one_scene,
+        "20 scenes take minutes; tests/app/evaluate/test_evaluate.py has small ones",
+    ),
     "segment": (of_that_robot, "executed as it stands"),
     "score": (lambda words: words, "executed as it stands"),
     "diagram": (lambda words: words, "executed as it stands"),
-    "bench": (lambda words: None, "measures for a minute; tests/app/test_stop_bench.py has its parts"),
+    "bench": (lambda words: None, "measures for a minute; tests/app/bench/test_stop_bench.py has its parts"),
     "emulate": (
         lambda words: None,
         "runs until Ctrl-C; tests/app/test_emulate.py has it in processes of its own",
     ),
-    "pictures": (lambda words: None, "films a whole run; tests/app/test_pictures_command.py has a small one"),
+    "pictures": (
+        lambda words: None,
+        "films a run; tests/app/show/test_pictures_command.py has a small one",
+    ),
     "hardware": (lambda words: None, "needs the drivers; tests/app/test_emulate.py runs it on emulated ones"),
     "hand-eye": (
         lambda words: None,

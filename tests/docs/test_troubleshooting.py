@@ -22,7 +22,7 @@ from riseg_drake.segmentation.above_table import AboveTableParameters, objects_a
 from riseg_drake.stations import lcm_channels
 from riseg_drake.stations.lcm_images import decode_images, encode_images
 from riseg_drake.systems.frame_view import FrameView
-from tests.app.test_hardware import Drivers
+from tests.app.hardware.test_hardware import Drivers
 from tests.docs.pages import CHECKOUT, blocks
 from tests.recording.made_recordings import drawn_frames, write
 from tests.segmentation.drawn_scene import CAMERA, DrawnScene, looking_down, planar
