@@ -58,6 +58,8 @@ class Mutation:
 
 
 _COMPARISONS = {ast.Lt: ">=", ast.LtE: ">", ast.Gt: "<=", ast.GtE: "<", ast.Eq: "!=", ast.NotEq: "=="}
+_COMMUTE = ("max", "min", "maximum", "minimum", "hypot", "array_equal")
+"""Functions of two values that are the same in either order: to swap them is no mistake."""
 _OPERATORS = {ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*", ast.BitAnd: "|", ast.BitOr: "&"}
 
 
@@ -84,7 +86,7 @@ def edits(tree: ast.AST, source: str) -> Iterator[Edit]:
             case ast.If(test=test) | ast.IfExp(test=test):
                 yield test, f"(not ({text(test)}))", "condition turned"
             case ast.Call(args=[first, second, *_]) if not {type(first), type(second)} & {ast.Starred}:
-                if text(first) != text(second):
+                if text(first) != text(second) and text(node.func).split(".")[-1] not in _COMMUTE:
                     yield first, text(second), "arguments swapped"
             case ast.Constant(value=float(value)) if value != 0:
                 yield node, repr(2 * value), "constant doubled"

@@ -1,0 +1,152 @@
+"""A picture cut into superpixels, of boxes whose pixels are known."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from riseg_drake.segmentation.above_table import AboveTable, AboveTableParameters, objects_above_table
+from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe
+from riseg_drake.segmentation.noise import MeasurementNoise, gray_variance
+from tests.segmentation.drawn_scene import DrawnScene, looking_down, planar
+
+SIZES = [(0.08, 0.06, 0.04), (0.05, 0.05, 0.02)]
+NOISE = MeasurementNoise()
+
+
+def seen(holes: np.ndarray | None = None) -> tuple:
+    """Two boxes beside each other: the frame, objMask, and the true labels."""
+    scene = DrawnScene(SIZES)
+    frame, label = scene.frame(0, looking_down(), [planar(-0.04, 0.0), planar(0.06, 0.0)])
+    if holes is not None:
+        frame = replace(frame, depth=np.where(holes, np.float32(0), frame.depth))
+    return frame, objects_above_table(frame, AboveTableParameters()), label
+
+
+@pytest.fixture(scope="module")
+def boxes() -> tuple:
+    return seen()
+
+
+@pytest.fixture(scope="module")
+def keyframe(boxes) -> Keyframe:
+    frame, above, _ = boxes
+    return make_keyframe(frame, above, NOISE, KeyframeParameters())
+
+
+def test_superpixels_cover_what_stands_there_and_nothing_else(keyframe, boxes):
+    _, above, _ = boxes
+    covered = keyframe.image_of(np.ones(keyframe.count, np.uint8))
+    np.testing.assert_array_equal(covered > 0, above.mask)
+    assert keyframe.area.sum() == np.count_nonzero(above.mask)
+    assert len(keyframe.area) == keyframe.count
+
+
+def test_they_are_about_as_large_as_they_shall_be_on_the_object(keyframe, boxes):
+    frame, above, _ = boxes
+    pixels = 0.006 * frame.intrinsics.fx / above.distance
+    assert np.sqrt(np.median(keyframe.area)) == pytest.approx(pixels, rel=0.25)
+    finer = make_keyframe(frame, above, NOISE, KeyframeParameters(superpixel=0.003))
+    assert finer.count > 2.5 * keyframe.count
+
+
+def test_what_a_metre_is_in_pixels_is_told_by_how_far_things_are(keyframe, boxes):
+    frame, above, _ = boxes
+    assert keyframe.pixels_per_metre == pytest.approx(frame.intrinsics.fx / above.distance)
+
+
+def test_points_lie_on_every_second_pixel_two_from_all_outlines_and_belong_to_their_superpixel(keyframe, boxes):
+    _, above, _ = boxes
+    inside = cv2.erode(above.mask.astype(np.uint8), np.ones((5, 5), np.uint8), borderValue=0) > 0
+    v, u = keyframe.points.pixel
+    assert inside[v, u].all()
+    assert ((v + u) % 2 == 1).all()
+    assert len(v) == np.count_nonzero(
+        inside & (np.add(*np.mgrid[: inside.shape[0], : inside.shape[1]]) % 2 == 1)
+    )
+    label = keyframe.image_of(np.arange(keyframe.count), -1)
+    np.testing.assert_array_equal(keyframe.owner, label[v, u])
+    np.testing.assert_array_equal(keyframe.point_count, np.bincount(label[v, u], minlength=keyframe.count))
+
+
+def test_points_have_the_image_s_gray_values_gradients_and_noise(keyframe, boxes):
+    frame, _, _ = boxes
+    v, u = keyframe.points.pixel
+    np.testing.assert_array_equal(keyframe.gray, frame.gray[v, u])
+    np.testing.assert_array_equal(keyframe.gradient_squared, frame.gradient_squared[v, u])
+    np.testing.assert_array_equal(keyframe.variance, gray_variance(frame.gradient_squared, NOISE)[v, u])
+    np.testing.assert_array_equal(keyframe.points.depth, frame.depth[v, u])
+
+
+def test_where_depth_is_missing_nothing_is_compared_but_in_pinholes(boxes):
+    _, _, label = boxes
+    v, u = (int(np.median(x)) for x in np.nonzero(label == 1))
+    holes = np.zeros(label.shape, bool)
+    holes[v - 4 : v + 5, u - 4 : u + 5] = True  # a hole, with its rim of two pixels
+    holes[v + 12, u] = True  # a pinhole
+    frame, above, _ = seen(holes)
+    pixel = make_keyframe(frame, replace(above, mask=label > 0), NOISE, KeyframeParameters()).points.pixel
+    around = (np.abs(pixel[0] - v) <= 6) & (np.abs(pixel[1] - u) <= 6)
+    assert not around.any()
+    beside = (np.abs(pixel[0] - v - 12) <= 1) & (np.abs(pixel[1] - u) <= 1)
+    assert beside.any()
+
+
+def test_heights_are_those_of_the_boxes_and_of_the_nearest_pixel_where_depth_is_missing(boxes):
+    _, _, label = boxes
+    v, u = (int(np.median(x)) for x in np.nonzero(label == 1))
+    holes = np.zeros(label.shape, bool)
+    holes[v - 3 : v + 4, u - 3 : u + 4] = True
+    frame, above, _ = seen(holes)
+    keyframe = make_keyframe(frame, replace(above, mask=label > 0), NOISE, KeyframeParameters())
+    height = np.zeros(label.shape, np.float32)
+    height[keyframe.region] = keyframe.height
+    assert height[v, u] == pytest.approx(0.04, abs=1e-4)
+    assert np.median(height[label == 2]) == pytest.approx(0.02, abs=1e-4)
+    assert not height[label == 0].any()
+
+
+def test_known_borders_between_bodies_cut(boxes):
+    frame, above, label = boxes
+    half = np.where((label == 1) & (np.arange(label.shape[1]) < np.median(np.nonzero(label == 1)[1])), 5, label)
+    keyframe = make_keyframe(frame, above, NOISE, KeyframeParameters(), half)
+    for k in np.unique(keyframe.superpixels.label[keyframe.superpixels.label >= 0]):
+        ids, pixels = np.unique(half[keyframe.region][keyframe.superpixels.label == k], return_counts=True)
+        of_bodies = pixels[ids > 0]
+        assert of_bodies.max() >= of_bodies.sum() - 5  # but for crumbs
+
+
+def test_shares_and_images_are_by_superpixel(keyframe):
+    every = np.arange(len(keyframe.owner))
+    np.testing.assert_allclose(keyframe.share_of_points(every), keyframe.point_count > 0)
+    (first,) = np.flatnonzero(keyframe.owner == keyframe.owner[0])[:1]
+    share = keyframe.share_of_points(np.array([first]))
+    assert share[keyframe.owner[0]] == pytest.approx(1 / keyframe.point_count[keyframe.owner[0]])
+    assert np.count_nonzero(share) == 1
+    image = keyframe.image_of(np.arange(keyframe.count) + 7, 3)
+    assert set(np.unique(image)) == {3, *range(7, 7 + keyframe.count)}
+
+
+def test_borders_are_measured_in_sides_of_a_superpixel(keyframe):
+    side = np.sqrt(np.median(keyframe.area))
+    np.testing.assert_allclose(keyframe.length * side, keyframe.superpixels.length)
+
+
+def test_what_stands_there_is_covered_with_four_pixels_around_it(keyframe, boxes):
+    _, above, _ = boxes
+    far = cv2.distanceTransform((~above.mask).astype(np.uint8), cv2.DIST_C, 3)
+    np.testing.assert_array_equal(keyframe.covered, far <= 4)
+
+
+def test_a_lower_box_in_front_of_a_higher_one_may_carry_it_and_a_flat_top_carries_nothing():
+    frame, label = DrawnScene(SIZES).frame(0, looking_down(), [planar(0.0, 0.0), planar(0.065, 0.0)])
+    above = AboveTable(label > 0, (0.45 - frame.depth).astype(np.float32), np.array([0, 0, 1.0, 0]), 2e-4, 0.42)
+    keyframe = make_keyframe(frame, above, NOISE, KeyframeParameters(), label)
+    number = keyframe.image_of(np.arange(keyframe.count), -1)
+    body = np.array([np.bincount(label[number == k]).argmax() for k in range(keyframe.count)])
+    a, b = keyframe.borders.T
+    between = (body[a] != body[b]) & ~keyframe.superpixels.behind
+    assert between.any()
+    assert keyframe.over[between].mean() > 0.8
+    assert keyframe.over[~between].mean() < 0.1
