@@ -2,7 +2,7 @@
 
 Superpixels a, b have the motion k, of the share pi_k of what stands there, with the probabilities q_a(k),
 q_b(k). Those of one body have the same. If a has k, a neighbour that is another body has l with the probability
-rho(l | k): what moves pushes it along now and then, what lies on it mostly goes along, what stands still mostly
+rho(l | k): what moves pushes it along now and then, what lies on it goes along as often as not, what stands still mostly
 stands beside what does so, too. All other motions are as likely as they are common.
 
     evidence(a, b) = log( sum_k q_a(k) q_b(k) / pi_k ) - log( sum_k,l q_a(k) rho(l | k) q_b(l) / pi_l )
@@ -40,9 +40,10 @@ class ObservationParameters:
     another view gloss and wrong depth look like a motion over larger patches."""
     along: float = 0.2
     """rho(k | k) of a motion: probability with which a thing pushes its neighbour along as if they were one."""
+    carried: float = 0.5
+    """The same where one of two may lie on the other: as often as not."""
     stays: float = 0.8
-    """rho(k | k) of standing still, with which the neighbour of what stands still stands still, too; and of any
-    motion where one of two may lie on the other."""
+    """rho(k | k) of standing still: with which the neighbour of what stands still stands still, too."""
     still_share: float = 0.5
     """Least share of standing still: most does."""
     still: float = 0.5
@@ -105,7 +106,7 @@ def observe(
     q = motion_posterior(nats, share, parameters.outlier)
     focal_length, p_KQ = compared.frame.intrinsics.fx, keyframe.edges.p_C0Q[::10]
     spans = [flow_difference(p_KQ, X, np.eye(4), focal_length) if len(p_KQ) else 0.0 for X in motions_K[needed]]
-    along = np.where(keyframe.over, parameters.stays, parameters.along)
+    along = np.where(keyframe.over, parameters.carried, parameters.along)
     return Observation(
         motions_K=motions_K[needed],
         motion=motion,

@@ -50,12 +50,27 @@ def test_a_slope_that_ends_at_a_step_is_one_with_it():
     assert may_lie_on(HALVES, height[:, ::-1].copy()) == [True]
 
 
-def test_a_wall_does_not_lie_on_the_floor_that_it_surrounds_but_a_thing_on_a_plate_does():
+def test_a_wall_does_not_lie_on_the_floor_that_it_surrounds_nor_a_foot_on_what_surrounds_it():
     mug = np.where(RADIUS < 15, 0.01, np.where(RADIUS < 22, 0.09, 0.0)).astype(np.float32)
     label = np.where(RADIUS < 15, 0, np.where(RADIUS < 22, 1, -1))
     assert may_lie_on(cut(label), mug) == [False]
-    stack = np.where(RADIUS < 15, 0.09, np.where(RADIUS < 22, 0.01, 0.0)).astype(np.float32)
-    assert may_lie_on(cut(label), stack) == [True]
+    foot = np.where(RADIUS < 15, 0.09, np.where(RADIUS < 22, 0.01, 0.0)).astype(np.float32)
+    assert may_lie_on(cut(label), foot) == [False]
+
+
+def test_what_sticks_out_over_the_edge_of_another_thing_may_lie_on_it():
+    upper, lower = np.hypot(V - 30, U - 42) < 15, RADIUS < 22
+    label = np.where(upper, 0, np.where(lower, 1, -1))
+    height = np.where(upper, 0.05, np.where(lower, 0.01, 0.0)).astype(np.float32)
+    assert may_lie_on(cut(label), height) == [True]
+    # The picture's end may hide that it does.
+    assert may_lie_on(cut(label[:, :34]), height[:, :34].copy()) == [True]
+    # A foot as near to the edge as pixels are blurred sticks out, one that is farther from it does not.
+    for distance, sticks_out in ((3, True), (7, False)):
+        upper = np.hypot(V - 30, U - 30 - (22 - 8 - distance)) < 8
+        label = np.where(upper, 0, np.where(lower, 1, -1))
+        height = np.where(upper, 0.05, np.where(lower, 0.01, 0.0)).astype(np.float32)
+        assert may_lie_on(cut(label), height) == [sticks_out]
 
 
 def test_a_hollow_is_what_water_would_stay_in_up_to_its_lowest_rim():
