@@ -2,8 +2,8 @@
 
 Superpixels a, b have the motion k, of the share pi_k of what stands there, with the probabilities q_a(k),
 q_b(k). Those of one body have the same. If a has k, a neighbour that is another body has l with the probability
-rho(l | k): what moves pushes it along now and then, what lies on it goes along as often as not, what stands still mostly
-stands beside what does so, too. All other motions are as likely as they are common.
+rho(l | k): what moves pushes it along now and then, what lies on it goes along as often as not, what stands
+still mostly stands beside what does so, too. All other motions are as likely as they are common.
 
     evidence(a, b) = log( sum_k q_a(k) q_b(k) / pi_k ) - log( sum_k,l q_a(k) rho(l | k) q_b(l) / pi_l )
 
