@@ -148,6 +148,14 @@ def test_without_groups_the_mask_is_the_one_before_pushed_on() -> None:
     np.testing.assert_array_equal(after.mask, np.roll(line.right, -2, axis=1) * np.uint16(7))
 
 
+@pytest.mark.parametrize(("shift", "grows"), [(0.79, False), (0.81, True)])
+def test_a_group_grows_over_flow_of_more_than_the_least_alone(shift, grows) -> None:
+    line = Line7(shift)
+    before = replace(nothing_segmented(CAMERA.shape), sequence=0)
+    after = line.take(before, 0, 1, line.flow, line.seed)
+    assert np.count_nonzero(after.mask) == (np.count_nonzero(line.right) if grows else 0)
+
+
 def test_frames_between_t_minus_1_and_t_leave_no_trace() -> None:
     line = Line7()
     before = replace(nothing_segmented(CAMERA.shape), sequence=0, label=line.right * np.uint16(7))
