@@ -1,5 +1,6 @@
 """Scenes: objects close together on the table, drawn from a seed and at rest, or placed as one likes."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -15,8 +16,10 @@ from riseg_drake.stations.settling import lay_pile, settle
 __all__ = ["PlacedConfig", "SceneConfig", "draw_scene", "make_scene", "place_scene"]
 
 DROP = 2e-4  # m; how far above its resting height an object starts
-LAYOUTS = 20  # whole layouts tried before a scene is called impossible
-LAYOUTS_OF_A_CHOICE = 5  # of the same objects, before others are drawn
+LAYOUTS_OF_A_CHOICE = 5  # whole layouts tried of the same objects, before others are drawn
+CHOICES = (
+    4  # of objects tried at least before a scene is called impossible; half of them before fewer are drawn
+)
 
 
 class _Layout(NamedTuple):
@@ -107,32 +110,43 @@ def draw_scene(config: SceneConfig, rng: np.random.Generator) -> list[PlacedObje
         )
     count = int(rng.integers(kind.count_min, min(kind.count_max, len(models)) + 1))
     restless = ""
-    for attempt in range(LAYOUTS):
-        if attempt % LAYOUTS_OF_A_CHOICE == 0:
-            if attempt >= LAYOUTS // 2:  # so many of these have no room
-                count = max(kind.count_min, count - 1)
-            chosen = [models[i] for i in rng.permutation(len(models))[:count]]
-            if config.layout != "spread":  # the large ones first: the others find room about them, and on them
-                chosen.sort(key=lambda model: -float(np.prod(np.ptp(model.footprint.corners(), axis=0))))
-        if config.layout == "pile":
-            heap = lay_pile(chosen, config.centre_W, rng)
-            if heap is not None and _reach(heap, config.centre_W) < kind.radius:
-                return heap
-            continue
-        shapes = [model.footprint for model in chosen]
-        gaps = (_gap(config, rng) for _ in chosen)
-        spots = lay_out(shapes, gaps, kind.habit, rng)
-        spots = centred(spots, shapes, config.centre_W, kind.radius) if spots else None
-        if spots is None:
-            continue
-        placed = [_stand(model, spot) for model, spot in zip(chosen, spots, strict=True)]
-        at_rest = settle(placed, config.centre_W)
-        restless = _restless(placed, at_rest)
-        if not restless:
-            return at_rest
+    for choice in itertools.count():
+        if choice >= CHOICES // 2:  # so many have no room
+            count = max(kind.count_min, count - 1)
+        chosen = [models[i] for i in rng.permutation(len(models))[:count]]
+        if config.layout != "spread":  # the large ones first: the others find room about them, and on them
+            chosen.sort(key=lambda model: -float(np.prod(np.ptp(model.footprint.corners(), axis=0))))
+        for _ in range(LAYOUTS_OF_A_CHOICE):
+            laid = _laid(chosen, kind, config, rng)
+            if laid is None:
+                continue
+            if config.layout == "pile":
+                return laid
+            at_rest = settle(laid, config.centre_W)
+            restless = _restless(laid, at_rest)
+            if not restless:
+                return at_rest
+        if choice + 1 >= CHOICES and count == kind.count_min:
+            break
     if restless:
         raise SceneError(f"{restless}; model it with z up, standing on a face or on three points or more")
     raise _no_room(chosen, kind)
+
+
+def _laid(
+    chosen: Sequence[ObjectModel], kind: _Layout, config: SceneConfig, rng: np.random.Generator
+) -> list[PlacedObject] | None:
+    """The objects in places of their own, a pile at rest, all others before they have settled; None where there
+    is no room."""
+    if config.layout == "pile":
+        heap = lay_pile(chosen, config.centre_W, rng)
+        return heap if heap is not None and _reach(heap, config.centre_W) < kind.radius else None
+    shapes = [model.footprint for model in chosen]
+    spots = lay_out(shapes, (_gap(config, rng) for _ in chosen), kind.habit, rng)
+    spots = centred(spots, shapes, config.centre_W, kind.radius) if spots else None
+    if spots is None:
+        return None
+    return [_stand(model, spot) for model, spot in zip(chosen, spots, strict=True)]
 
 
 def _reach(placed: Sequence[PlacedObject], centre_W: Sequence[float]) -> float:

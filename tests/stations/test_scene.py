@@ -18,7 +18,9 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
 
 from riseg_drake.app.scenario import load_scenario
+from riseg_drake.stations import scene as scene_module
 from riseg_drake.stations.footprint import Footprint, separation, travel
+from riseg_drake.stations.layouts import lay_out
 from riseg_drake.stations.object_models import SceneError, find_model, find_models
 from riseg_drake.stations.placed_object import PlacedObject, add_scene, object_id_table
 from riseg_drake.stations.scene import PlacedConfig, SceneConfig, draw_scene, make_scene
@@ -388,3 +390,18 @@ def test_a_drawn_pile_is_at_rest_inside_the_work_area_and_the_same_again():
 def test_where_as_many_as_were_drawn_have_no_room_there_are_fewer():
     config = SceneConfig(objects="package://riseg_drake_models/household", layout="spread")
     assert len(draw_scene(config, np.random.default_rng(911))) == 5  # six were drawn, three times in vain
+
+
+def test_where_there_is_room_for_the_fewest_alone_these_are_drawn(monkeypatch):
+    drawn = []
+
+    def two_at_most(shapes, gaps, habit, rng):
+        drawn.append(len(shapes))
+        return lay_out(shapes, gaps, habit, rng) if len(shapes) <= 2 else None
+
+    monkeypatch.setattr(scene_module, "lay_out", two_at_most)
+    config = SceneConfig(layout="crowd", count_min=2, count_max=9)
+    seed = next(s for s in range(99) if np.random.default_rng(s).integers(2, 10) == 9)
+    assert len(draw_scene(config, np.random.default_rng(seed))) == 2
+    # Each choice of objects is tried five times, two with nine, and then one fewer each time.
+    assert drawn[::5] == [9, 9, 8, 7, 6, 5, 4, 3, 2]
