@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from riseg_drake.evaluation.scores import FIGURES, mean_scores, score
+from riseg_drake.evaluation.scores import FIGURES, mean_scores, overlap_f_by_object, score
 
 REFERENCE = (
     Path(os.environ.get("RISEG_EVALUATION", Path(__file__).parents[3] / "shared" / "evaluation"))
@@ -45,6 +45,10 @@ def test_something_predicted_on_an_empty_table_is_wrong_and_complete():
 
 def test_an_empty_table_seen_empty_is_perfect():
     assert astuple(score(NOTHING, NOTHING)) == (1, 1, 1, 1, 1, 1, 0, 0, 0, 1)
+
+
+def test_on_an_empty_table_no_object_has_an_f():
+    assert overlap_f_by_object(TWO, NOTHING) == overlap_f_by_object(NOTHING, NOTHING) == {}
 
 
 def test_ids_do_not_matter():
@@ -120,6 +124,7 @@ def test_mean_over_images_is_unweighted_and_not_the_f_of_the_means():
         (np.zeros((40, 50), np.float32), "integers"),
         (np.zeros((40, 50, 3), np.uint16), "label image"),
         (np.full((40, 50), -1), "from 0 up"),
+        (np.zeros((0, 50), np.uint16), r"its shape is \(0, 50\)"),
     ],
 )
 def test_what_is_no_label_image_of_the_same_size_is_refused(prediction, message):
