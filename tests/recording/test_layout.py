@@ -60,8 +60,20 @@ def test_a_list_is_no_camera():
         camera_from_json([640, 480])
 
 
-def test_a_usual_camera_is_not_warned_of():
-    assert unlikely_camera(USUAL) == []
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {},
+        {"cx": 320 + 0.149 * 640, "cy": 240 - 0.149 * 480},
+        {"fx": 1.24 * 610},
+        {"fy": 1.24 * 615},
+        {"fx": 0.31 * 640, "fy": 200.0},
+        {"fx": 4.99 * 640, "fy": 3200.0},
+    ],
+    ids=["usual", "off the middle", "wide pixels", "tall pixels", "wide angle", "long lens"],
+)
+def test_a_camera_that_may_well_be_is_not_warned_of(changed):
+    assert unlikely_camera(replace(USUAL, **changed)) == []
 
 
 @pytest.mark.parametrize(
