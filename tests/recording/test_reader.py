@@ -66,6 +66,16 @@ def test_stamps_belong_together_up_to_two_hundredths_of_a_second(folder):
     assert (len(wider), wider.left_out) == (2, [])
 
 
+def test_lines_that_are_not_newer_are_noted_of_every_list_in_which_they_stand(folder):
+    both_listed(folder, [0.0, 0.5, 0.5])
+    numbers(folder, "groundtruth.txt", (0.0, *POSE), (0.0, *POSE), (0.5, *POSE))
+    numbers(folder, "joints.csv", (0.0, 1), (0.5, 1), (0.5, 1), separator=",")
+    reader = RecordingReader(folder)
+    assert len(reader) == 2
+    noted = [(each.file.removeprefix(f"{folder}/"), each.line) for each in reader.left_out]
+    assert noted == [("groundtruth.txt", 2), ("joints.csv", 3), ("rgb.txt", 3), ("depth.txt", 3)]
+
+
 @pytest.mark.parametrize("name", ["groundtruth.txt", "joints.csv"])
 def test_a_frame_without_a_pose_or_joints_near_it_is_left_out_where_others_have_them(folder, name):
     both_listed(folder, [1.0, 1.5])

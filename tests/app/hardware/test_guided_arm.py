@@ -18,7 +18,7 @@ from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.stations.hardware import Targets
 from riseg_drake.systems.arm_motion import ArmMotion
 from tests.robot.lab import PERIOD, Lab
-from tests.systems.test_arm_motion import Q_OBSERVE, THERE, Eyes, Script, push_to
+from tests.systems.scripted_eyes import Q_OBSERVE, THERE, Eyes, Script, push_to
 
 
 class Room:
