@@ -75,7 +75,8 @@ ROLLED = moved(turned(turned(turned(LYING, "z", -35), "x", 90), "z", 35), 0.03 *
         (moved(LYING, 0, 0, 0.04), ROLLED, AXIS, 0.0, "fell"),
         (moved(CUBE, 0, 0, 0.04), turned(CUBE, "x", -90), NOT_ROUND, 90.0, "toppled"),
         (CUBE, moved(CUBE, 0, 0, 0.04), NOT_ROUND, 0.0, ""),
-        (moved(CUBE, 0, 0, 0.008), CUBE, NOT_ROUND, 0.0, ""),
+        (moved(CUBE, 0, 0, 0.0099), CUBE, NOT_ROUND, 0.0, ""),
+        (moved(CUBE, 0, 0, 0.0101), CUBE, NOT_ROUND, 0.0, "fell"),
     ],
     ids=[
         "a can rolls by a quarter",
@@ -95,6 +96,7 @@ ROLLED = moved(turned(turned(turned(LYING, "z", -35), "x", 90), "z", 35), 0.03 *
         "a box falls off one and turns over",
         "a box is pushed onto another",
         "a thing comes down from a sheet",
+        "one comes down from a board",
     ],
 )
 def test_what_topples_has_turned_over_and_what_falls_has_come_down_without(before, after, axes, tilt, verdict):

@@ -66,7 +66,7 @@ def test_an_arm_rests_where_every_joint_is_within_a_hundredth_rad(joint, off, re
     motion = ArmMotion(Q_OBSERVE)
     simulator = Simulator(motion)
     context = simulator.get_mutable_context()
-    frame = Frame(5, 1.0, CAMERA, None, np.ones((4, 4), np.float32), np.eye(4), np.zeros((4, 4), bool))
+    frame = Frame(1, 1.0, CAMERA, None, np.ones((4, 4), np.float32), np.eye(4), np.zeros((4, 4), bool))
     for name, value in {
         "decision": Decision(push_to(THERE), unsettled_area=0.01),
         "pair": FramePair(frame, frame),

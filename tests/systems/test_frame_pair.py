@@ -13,7 +13,9 @@ from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import NO_FRAME, NO_PAIR, FramePair
 from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE, AboveTable
+from riseg_drake.segmentation.camera_motion import CameraMotionParameters
 from riseg_drake.segmentation.frame_pairs import FramePairParameters
+from riseg_drake.systems import frame_pair
 from riseg_drake.systems.frame_pair import FramePairMemory
 from riseg_drake.systems.frame_view import FrameView
 from tests.systems.ports import port_names
@@ -203,3 +205,27 @@ def test_an_image_that_repeats_is_no_new_frame() -> None:
 def test_an_unknown_kind_of_pairs_is_refused_with_the_choices() -> None:
     with pytest.raises(ValueError, match="motion or consecutive"):
         Loop(kind="keyframe").at(2 * PERIOD)
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_the_function_is_handed_the_frame_what_flowed_and_the_parameters(monkeypatch, given: bool) -> None:
+    handed = []
+
+    def with_frame(memory, frame, *others):
+        handed.append(others)
+        return replace(memory, pair=FramePair(frame, frame))
+
+    monkeypatch.setattr(frame_pair, "with_frame", with_frame)
+    parameters, camera_motion = FramePairParameters(kind="consecutive"), CameraMotionParameters(exact=0.7)
+    memory = FramePairMemory(PERIOD, OFFSET, *((parameters, camera_motion) if given else ()))
+    simulator = Simulator(memory)
+    context = simulator.get_mutable_context()
+    for number in range(2):
+        frame = replace(NO_FRAME, sequence=number, time=float(number))
+        for name, value in (("frame", frame), ("above_table", above_of(number))):
+            memory.GetInputPort(name).FixValue(context, Value[object](value))
+        memory.GetInputPort("flow_span").FixValue(context, [7.5])
+        simulator.AdvanceTo(number * PERIOD + JUST_AFTER)
+    expected = (parameters, camera_motion) if given else (FramePairParameters(), CameraMotionParameters())
+    # Nothing has flowed before there is a pair.
+    assert handed == [(above_of(0), 0.0, *expected), (above_of(1), 7.5, *expected)]

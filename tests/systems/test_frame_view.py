@@ -94,3 +94,43 @@ def test_images_of_another_size_are_refused_with_all_sizes(color_size, depth_siz
     assert "{}x{}".format(*color_size) in str(error.value)
     assert "{}x{}".format(*depth_size) in str(error.value)
     assert "\n" not in str(error.value)
+
+
+ELSEWHERE = forward(np.full(7, 0.7))
+PIXELS = np.eye(4, 6, dtype=bool)
+
+
+@pytest.mark.parametrize("pose_known", [True, False], ids=["pose from theta", "pose from a port"])
+@pytest.mark.parametrize("robot_known", [True, False], ids=["robot from theta", "robot from a port"])
+def test_what_does_not_follow_from_theta_has_a_port_and_theta_has_one_if_anything_does(
+    pose_known: bool, robot_known: bool
+) -> None:
+    view = FrameView(CAMERA, forward if pose_known else None, silhouette if robot_known else None, 9)
+    inputs = ["color_image", "depth_image", "image_time"]
+    inputs += ["position"] if pose_known or robot_known else []
+    inputs += [] if pose_known else ["camera_pose"]
+    inputs += [] if robot_known else ["robot_pixels"]
+    assert port_names(view) == (inputs, ["frame"])
+    color, depth = images()
+    context, q = view.CreateDefaultContext(), np.arange(9) / 10
+    values = {
+        "color_image": Value(color),
+        "depth_image": Value(depth),
+        "image_time": [0.5],
+        "position": q,
+        "camera_pose": Value[object](ELSEWHERE),
+        "robot_pixels": Value[object](PIXELS),
+    }
+    for name in inputs:
+        view.GetInputPort(name).FixValue(context, values[name])
+    frame = view.GetOutputPort("frame").Eval(context)
+    np.testing.assert_array_equal(frame.X_WC, forward(q) if pose_known else ELSEWHERE)
+    np.testing.assert_array_equal(frame.robot, silhouette(q) if robot_known else PIXELS)
+    assert view.intrinsics == CAMERA
+    assert frame.sequence == 0
+
+
+def test_without_a_depth_image_there_is_no_frame_yet() -> None:
+    color, _ = images()
+    assert seen(color, ImageDepth32F()) is NO_FRAME
+    assert seen(ImageRgba8U(), images()[1]) is NO_FRAME

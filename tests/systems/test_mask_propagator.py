@@ -137,6 +137,38 @@ def test_its_parameters_are_those_given(payloads) -> None:
         Alone(payloads, SegmentParameters(method="none")).at(PERIOD)
 
 
+@pytest.mark.parametrize("given", [True, False])
+def test_the_function_is_handed_the_parameters_given_or_those_by_default(payloads, monkeypatch, given) -> None:
+    handed = []
+    monkeypatch.setattr(mask_propagator, "segment", lambda *arguments: handed.append(arguments) or arguments[0])
+    parameters, bfif = SegmentParameters(method="paper"), BFIFParameters(explained_min=0.3)
+    system = MaskPropagator(CAMERA, PERIOD, OFFSET, *((parameters, bfif) if given else ()))
+    simulator = Simulator(system)
+    for name in ("pair", "expected_flow", "optical_flow", "groups"):
+        value = Value[object](getattr(payloads, name))
+        system.GetInputPort(name).FixValue(simulator.get_mutable_context(), value)
+    for name, above in (("above_table_reference", payloads.above_0), ("above_table", payloads.above_1)):
+        system.GetInputPort(name).FixValue(simulator.get_mutable_context(), Value[object](above))
+    simulator.AdvanceTo(PERIOD / 2)
+    ((before, *inputs, handed_parameters, handed_bfif),) = handed
+    assert before.mask.shape == CAMERA.shape
+    for value, expected in zip(
+        inputs,
+        (
+            payloads.pair,
+            payloads.expected_flow,
+            payloads.optical_flow,
+            payloads.groups,
+            payloads.above_0,
+            payloads.above_1,
+        ),
+        strict=True,
+    ):
+        np.testing.assert_equal(value, expected)
+    assert handed_parameters == (parameters if given else SegmentParameters())
+    assert handed_bfif == (bfif if given else BFIFParameters())
+
+
 def test_two_runs_with_the_same_inputs_give_the_same_bytes(payloads) -> None:
     literal = SegmentParameters(method="paper")  # which labels what moves in the first pair
     masks = [Alone(payloads, literal).at(PERIOD) for _ in range(2)]

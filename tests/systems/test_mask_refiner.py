@@ -128,6 +128,23 @@ def test_every_answer_is_shown_though_several_end_at_once(drawn_frames, model):
     assert shown == [drawn_frames[k].time for k in (0, 2, 4, 4)]
 
 
+def test_one_is_refined_after_the_other(drawn_frames, model):
+    threads = set()
+
+    def noted(frame, mask):
+        threads.add(threading.get_ident())
+        return model(frame, mask)
+
+    alone = Alone(noted, drawn_frames)
+    for number in (0, 2, 4):
+        alone.tick(number, ArmPhase.OBSERVE)
+        alone.tick(number + 1, ArmPhase.PUSH)
+    model.may_end.set()
+    alone.finish()
+    assert len(threads) == 1
+    assert model.frames == [0, 2, 4]
+
+
 def test_on_demand_the_present_mask_is_refined_at_once(drawn_frames, model):
     model.may_end.set()
     alone = Alone(model, drawn_frames)

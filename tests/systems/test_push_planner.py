@@ -10,10 +10,13 @@ from riseg_drake.geometry.camera import Intrinsics, rays
 from riseg_drake.geometry.rgbd import NO_PAIR, Frame, FramePair
 from riseg_drake.pushing import push_planning
 from riseg_drake.pushing.decision import UNDECIDED, Ending
+from riseg_drake.pushing.find_action import FindActionParameters
 from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.pushing.push_path import plan_push_path
+from riseg_drake.pushing.push_planning import PushPlanningParameters
 from riseg_drake.pushing.tried_pushes import TriedPush
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture, observe_pose
+from riseg_drake.systems import push_planner
 from riseg_drake.systems.push_planner import PushPlanner
 
 CAMERA = Intrinsics(640, 480, 616.285, 615.778, 301.418, 232.864)
@@ -144,3 +147,31 @@ def test_ports_have_the_names_of_the_contract(panda):
     names = [planner.get_input_port(i).get_name() for i in range(planner.num_input_ports())]
     assert names == ["pair", "above_table", "mask", "position", "tried_pushes", "found"]
     assert planner.get_output_port().get_name() == "decision"
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_the_function_is_handed_what_the_ports_say_and_random_numbers_of_seed_and_frame(
+    panda, q_observe, scene, monkeypatch, given
+):
+    handed = []
+    monkeypatch.setattr(push_planner, "plan_push", lambda *arguments: handed.append(arguments) or UNDECIDED)
+    pair, above = scene
+    parameters = PushPlanningParameters(FindActionParameters(paths=3))
+    found, tried = NOTHING + 1, (TriedPush(np.zeros(3), np.zeros(2), True),)
+    planner = PushPlanner(panda, parameters, 8) if given else PushPlanner(panda)
+    context = planner.CreateDefaultContext()
+    values = {"pair": pair, "above_table": above, "mask": NOTHING}
+    for name, value in {**values, **({"tried_pushes": tried, "found": found} if given else {})}.items():
+        planner.GetInputPort(name).FixValue(context, Value[object](value))
+    planner.GetInputPort("position").FixValue(context, q_observe)
+    assert planner.GetOutputPort("decision").Eval(context) is UNDECIDED
+    ((frame, seen, mask, q, kinematics, rng, handed_tried, handed_parameters, handed_found),) = handed
+    assert frame is pair.current
+    assert kinematics is panda
+    for value, expected in ((seen.height, above.height), (mask, NOTHING), (q, q_observe)):
+        np.testing.assert_array_equal(value, expected)
+    expected = np.random.default_rng([8 if given else 0, pair.current.sequence])
+    assert rng.bit_generator.state == expected.bit_generator.state
+    assert [each.changed for each in handed_tried] == ([True] if given else [])
+    np.testing.assert_array_equal(handed_found, found if given else None)
+    assert handed_parameters == (parameters if given else PushPlanningParameters())
