@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from riseg_drake.evaluation import baselines
 from riseg_drake.evaluation.baselines import BASELINES, BaselineParameters, depth_clusters, graph_segments
 from riseg_drake.geometry.camera import Intrinsics
 
@@ -72,3 +73,36 @@ def test_specks_and_pixels_without_depth_are_no_objects(segment):
     assert not labels[100:103, 100:103].any()
     assert not labels[50:52, 30:32].any()
     assert labels[40, 40] > 0
+
+
+def test_the_graph_is_asked_in_metres_whatever_the_camera(monkeypatch):
+    """Colour from 0 to 1, a metre of depth as 5; areas and lengths in pixels of what stands at its distance."""
+    asked = []
+
+    def segmented(image, **others):
+        asked.append((image, others))
+        return np.ones(image.shape[:2], int)
+
+    monkeypatch.setattr(baselines, "felzenszwalb", segmented)
+    scene = table_scene()
+    put(scene, LEFT, (51, 102, 255), 0.1)
+    scene[1][30, 20] = 0.41
+    scene[1][31, 20] = 0  # no depth: as good as not there
+    labels = graph_segments(*scene, Intrinsics(160, 120, 200.0, 128.0, 79.5, 59.5), PARAMETERS)
+    ((image, others),) = asked
+    per_m2 = 200 * 128 / 0.4**2  # 160 000 pixels a square metre, 400 x 400
+    assert others == {
+        "scale": pytest.approx(3e-4 * per_m2),
+        "sigma": pytest.approx(0.001 * 400),
+        "min_size": 64,
+        "channel_axis": -1,
+    }
+    assert image.shape == (62, 42, 4)  # a pixel around
+    np.testing.assert_allclose(image[1, 1], [0.2, 0.4, 1.0, 0.05], atol=1e-6)
+    np.testing.assert_allclose(image[1, 2], [0.2, 0.4, 1.0, 0.0], atol=1e-6)
+    for outside in (image[0, 0], image[-1, -1], image[2, 1]):
+        np.testing.assert_array_equal(outside, [0, 0, 0, 10])
+    expected = np.zeros(SHAPE, int)
+    expected[LEFT] = 1
+    expected[31, 20] = 0
+    np.testing.assert_array_equal(labels, expected)

@@ -82,3 +82,32 @@ def test_bad_folders_are_named_in_one_line(folders, spoil, message):
     with pytest.raises(LabelFolderError, match=message) as error:
         list(score_folders(predicted, true))
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("more", "says"), [(1, "lacks a0.png;"), (2, "lacks a0.png and 1 more;"), (4, "lacks a0.png and 3 more;")]
+)
+@pytest.mark.parametrize("lacking", [0, 1], ids=["predicted", "true"])
+def test_the_folder_that_lacks_images_is_named_with_the_first_and_how_many(folders, more, says, lacking):
+    labels = np.zeros((4, 4), np.uint8)
+    for folder in folders:
+        write(folder / "b.png", labels)
+    for k in range(more):
+        write(folders[1 - lacking] / f"a{k}.png", labels)
+    with pytest.raises(LabelFolderError, match=f"^{folders[lacking]} {says}"):
+        list(score_folders(*folders))
+
+
+def test_names_may_end_in_capitals_and_other_files_are_passed_over(folders):
+    for folder in folders:
+        write(folder / "a.png", np.ones((4, 4), np.uint8))
+        (folder / "a.png").rename(folder / "A.PNG")
+        (folder / "notes.txt").write_text("")
+    assert [name for name, _ in score_folders(*folders)] == ["A.PNG"]
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_a_colour_image_is_none_of_labels_in_any_depth(tmp_path, kind):
+    write(tmp_path / "x.png", np.zeros((4, 4, 3), kind))
+    with pytest.raises(LabelFolderError, match=r"x\.png is a colour image"):
+        read_labels(tmp_path / "x.png")

@@ -3,12 +3,21 @@ from dataclasses import replace
 import cv2
 import pytest
 
-from riseg_drake.evaluation.disturbance import Disturbance, ObjectMotion
+from riseg_drake.evaluation.disturbance import Disturbance, DisturbanceFigures, ObjectMotion
 from riseg_drake.evaluation.figure import figure_png
 from riseg_drake.evaluation.in_motion import InMotion
 from riseg_drake.evaluation.published import PUBLISHED
-from riseg_drake.evaluation.report import report_text
+from riseg_drake.evaluation.report import (
+    disturbance_cells,
+    ending_counts,
+    markdown_table,
+    percent,
+    report_text,
+    score_cells,
+    table_figures,
+)
 from riseg_drake.evaluation.scene_result import SceneResult
+from riseg_drake.evaluation.scores import Scores
 from riseg_drake.evaluation.step_means import EMPTY_PREDICTION
 
 
@@ -103,6 +112,73 @@ def test_a_switch_is_compared_scene_by_scene():
     # Differences of -10 and -30: mean -20, standard error 10.
     assert rows(text, "no memory")[0][-1] == "-20.0 ± 10.0"
     assert "one switch at a time" not in report_text([FAILED], {}, last_step=2)
+
+
+def test_a_table_has_its_figures_to_the_right_and_no_cell_ends_a_row():
+    assert markdown_table(("a", "b", "c"), [("1", "2|3", "|"), ("4", "5", "6")]) == (
+        "| a | b | c |\n| --- | ---: | ---: |\n| 1 | 2/3 | / |\n| 4 | 5 | 6 |\n"
+    )
+
+
+def test_the_seven_figures_are_those_of_the_papers_table_and_figure():
+    each = Scores(0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1234)
+    assert table_figures(each) == (0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.1234)
+    assert score_cells(each) == ["1.0", "2.0", "3.0", "4.0", "5.0", "6.0", "12.3"]
+    assert percent(float("nan")) == "–"
+
+
+def test_what_was_moved_is_in_centimetres_millimetres_and_degrees():
+    figures = DisturbanceFigures(7, 0.01234, 0.0012345, 12.34, 4, 5, 6)
+    assert disturbance_cells(figures) == ["7", "1.23", "1.23", "12.3", "4", "5", "6"]
+
+
+def test_the_settings_come_first_and_thresholds_are_said(text):
+    assert text.startswith("# Evaluation\n\n- scenes: 3\n")
+    for said in (
+        "Overlap F above\n75%.",
+        "more than 20 degrees count",
+        "more than\n1 cm without",
+        "by 1 cm or",
+    ):
+        assert said in text
+    assert "**" not in report_text([GOOD], {}, 2).split("## Scores")[0]
+
+
+def test_how_many_scenes_got_how_far_is_said(text):
+    assert "over the 3 scenes" in text
+    assert "Of the 3 scenes 2 reached 1, 2 reached 2, 0 reached 3." in text
+
+
+def test_a_scenes_row_has_its_last_figures(text):
+    assert rows(text, "[scene_000](scene_000/step_2/overlay.png)") == [
+        ["100", "2", "90.0", "0.0", "0 of 4", "80.0", "no push is left"]
+    ]
+    assert rows(text, "scene_001") == [["101", "0", "0.0", "0.0", "–", "–", "the table broke"]]
+
+
+def test_ends_are_counted_without_failures_the_most_frequent_first():
+    late = replace(GOOD, ended="time")
+    scenes = [late, GOOD, FAILED, BETTER, replace(GOOD, ended=""), replace(FAILED, ended="time")]
+    assert list(ending_counts(scenes).items()) == [("nothing_valid", 2), ("time", 1), ("otherwise", 1)]
+
+
+def test_what_was_left_is_over_the_runs_in_which_it_is_known():
+    unknown = replace(GOOD, unsettled_area_m2=float("nan"))
+    scenes = [GOOD, unknown, BETTER, replace(unknown, ended="")]
+    scenes += [replace(GOOD, failure="broken", unsettled_area_m2=1.0)]
+    text = report_text(scenes, {}, 2)
+    assert rows(text, "nothing_valid") == [["3", "25.0", "40.0"]]
+    assert rows(text, "otherwise") == [["1", "–", "–"]]
+
+
+def test_ours_and_each_switch_are_in_percent_after_the_last_interaction():
+    broken = replace(GOOD, ablation_failures={"no memory": "out of memory"})
+    text = report_text([broken], {}, last_step=2)
+    ours = rows(text.split("one switch at a time")[1], "**riseg_drake**")
+    assert ours == [["100.0", "0.0", "90.0", "100.0", "0.0", "0.0", "90.0", ""]]
+    # One scene has no standard error.
+    assert rows(text, "no memory") == [["100.0", "0.0", "80.0", "100.0", "0.0", "0.0", "80.0", "-10.0"]]
+    assert "In scene_000 *no memory* failed on the way and keeps what it had: out of memory\n" in text
 
 
 def test_the_figure_is_a_picture(tmp_path):
