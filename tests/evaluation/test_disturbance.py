@@ -29,7 +29,7 @@ def moved(X_WB, *p):
 
 
 def test_turning_on_the_table_is_no_tilt_and_leaning_is():
-    X_WB0 = turned(turned(np.eye(4), "x", 17), "y", -11)
+    X_WB0 = moved(turned(turned(np.eye(4), "x", 17), "y", -11), 0.5, -0.2, 0.1)
     before = {"a": X_WB0, "b": X_WB0}
     after = {"a": moved(turned(X_WB0, "z", 70), 0.03, 0.04, 0), "b": turned(X_WB0, "y", 10)}
     motions = motion_between(before, before, after, {})
@@ -171,6 +171,7 @@ def test_what_falls_counts_once_and_no_more_where_it_topples_then():
 
     assert counts(state(0.01), state(0.03), state(0.05)) == [(0, 0), (1, 0), (0, 0)]
     assert counts(state(0.03), state(0.03, 30.0), state(0.03, 10.0)) == [(1, 0), (0, 1), (0, 0)]
+    assert counts(state(0.03, 30.0), state(0.03, 30.0), state(0.03, 30.0)) == [(0, 1), (0, 0), (0, 0)]
     assert counts(state(0.7, left=True), state(0.7, left=True)) == [(0, 0), (0, 0)]
 
 

@@ -9,6 +9,7 @@ from pydrake.math import RigidTransform
 
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.recording.layout import (
+    RecordedFrame,
     RecordingError,
     camera_from_json,
     camera_to_json,
@@ -99,3 +100,9 @@ def test_poses_are_those_of_drake_with_the_scalar_last():
     numbers = [0.3, -0.2, 0.9, *q[1:], q[0]]
     np.testing.assert_allclose(pose_from_numbers(np.array(numbers)), X, atol=1e-12)
     assert pose_to_numbers(X) == pytest.approx(numbers)
+
+
+def test_a_frame_that_was_not_read_stands_in_no_line_of_no_file():
+    frame = RecordedFrame(0.5, np.zeros((2, 3, 3), np.uint8), np.zeros((2, 3), np.float32))
+    assert (frame.name, frame.line) == ("", 0)
+    assert frame.X_WC is frame.position is frame.robot is frame.labels is None
