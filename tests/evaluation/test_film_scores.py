@@ -64,6 +64,60 @@ def test_an_id_that_lies_mostly_on_a_thing_is_not_false_and_another_one_is(box) 
     assert row["ms_a_frame"] == pytest.approx(100)
 
 
+def labels(*squares) -> np.ndarray:
+    """A mask with the ids 1, 2, ... in these squares."""
+    mask = np.zeros(SHAPE, np.uint16)
+    for number, each in enumerate(squares, start=1):
+        mask[each] = number
+    return mask
+
+
+def test_a_thing_counts_from_the_frame_on_in_which_it_has_settled(box) -> None:
+    scores = FilmScores(box)
+    for number, mask in enumerate((labels(), labels(), labels(square(20, 20)), labels(square(20, 20, 5)))):
+        scores.add(number, mask, None, 0.1)
+    assert scores.of_thing["box"].overlaps == [1.0, 0.25]
+    assert scores.as_dict()["things"]["box"]["iou"] == pytest.approx(0.625)
+    unsettled = FilmScores(box)
+    unsettled.add(1, labels(square(20, 20)), None, 0.1)
+    assert unsettled.as_dict()["things"] == {"box": {"ids": 1, "iou": 0.0}}
+
+
+def test_an_id_belongs_to_a_thing_if_more_than_half_of_it_lies_there(box) -> None:
+    half, more = labels(square(20, 15)), labels(square(20, 16))
+    for mask, false in ((half, 100), (more, 0)):
+        scores = FilmScores(box)
+        scores.add(0, mask, None, 0.1)
+        assert scores.as_dict()["false_pixels_a_frame"] == false
+        assert scores.as_dict()["frames_with_a_false_object"] == (false > 0)
+        assert len(scores.of_thing["box"].found_ids) == (false == 0)
+
+
+def test_false_pixels_are_over_all_frames_and_work_is_the_median(box) -> None:
+    scores = FilmScores(box)
+    for number, seconds in enumerate((0.01, 0.02, 0.9)):
+        scores.add(number, labels(square(45, 60, 3 if number == 1 else 0)), None, seconds)
+    row = scores.as_dict()
+    assert row["frames"] == 3
+    assert row["false_pixels_a_frame"] == 3
+    assert row["ms_a_frame"] == pytest.approx(20)
+
+
+def test_where_it_is_not_known_what_is_true_nothing_is_false(tmp_path) -> None:
+    things = things_of(tmp_path, {"things": {"ball": {"settled_at": 0, "circle": {"3": [40, 20, 9]}}}})
+    scores = FilmScores(things)
+    for number in (3, 4):
+        scores.add(number, labels(square(45, 60)), None, 0.1)
+    assert (scores.frames, scores.false_frames, scores.false_pixels) == (2, 1, 100)
+    assert scores.of_thing["ball"].overlaps == [0.0]
+
+
+def test_a_thing_that_is_all_hidden_does_not_count(box) -> None:
+    scores = FilmScores(box)
+    scores.add(2, labels(), np.ones(SHAPE, bool), 0.1)
+    assert scores.of_thing["box"].overlaps == []
+
+
 def test_what_hands_hide_does_not_count(box) -> None:
     scores, mask = FilmScores(box), np.zeros(SHAPE, np.uint16)
     mask[square(20, 20)] = 1

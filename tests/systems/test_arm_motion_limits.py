@@ -80,6 +80,27 @@ def test_an_arm_rests_where_every_joint_is_within_a_hundredth_rad(joint, off, re
     assert (motion.GetOutputPort("active_push").Eval(context) is not NO_PUSH) is rests
 
 
+def test_an_arm_that_was_moved_meanwhile_rests_anew():
+    motion = ArmMotion(Q_OBSERVE)
+    simulator = Simulator(motion)
+    context = simulator.get_mutable_context()
+
+    def show(until, measured, time=-1.0):
+        frame = Frame(1, time, CAMERA, None, np.ones((4, 4), np.float32), np.eye(4), np.zeros((4, 4), bool))
+        motion.GetInputPort("pair").FixValue(context, Value[object](FramePair(frame, frame)))
+        motion.GetInputPort("position_measured").FixValue(context, measured)
+        simulator.AdvanceTo(until)
+        return motion.GetOutputPort("active_push").Eval(context)
+
+    motion.GetInputPort("decision").FixValue(context, Value[object](Decision(push_to(THERE))))
+    motion.GetInputPort("mask").FixValue(context, Value[object](np.zeros((4, 4), np.uint16)))
+    show(0.11, Q_OBSERVE)
+    show(0.21, Q_OBSERVE + 0.1)
+    show(0.31, Q_OBSERVE)  # at rest again since the look at 7/30 s
+    assert show(0.61, Q_OBSERVE, time=7 / 30 + 0.249) is NO_PUSH
+    assert show(0.71, Q_OBSERVE, time=7 / 30 + 0.251) is not NO_PUSH
+
+
 def test_frames_without_a_push_count_only_in_a_row():
     script = Script([push_to(THERE)], vain_looks=1)
     phases, motion, context, _ = run(script, 6.0)
