@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from riseg_drake.evaluation.boundary import boundary_map, dilate, tolerance
 from riseg_drake.evaluation.scores import FIGURES, mean_scores, overlap_f_by_object, score
 
 REFERENCE = (
@@ -90,6 +91,23 @@ def test_a_mask_that_fills_the_image_has_no_boundary():
     assert np.isnan(scores.boundary_precision)
     assert scores.boundary_recall == 0
     assert scores.boundary_f == 0
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_boundaries_agree_as_in_the_whole_image_wherever_the_objects_lie(seed):
+    rng = np.random.default_rng(seed)
+
+    def box():
+        """Of at least 3 pixels on a side; every other one begins or ends at an edge of the image."""
+        (v0, v1), (u0, u1) = (np.sort(rng.choice(np.arange(0, size + 1, 3), 2, False)) for size in (39, 48))
+        return boxes((v0 if seed % 4 else 0, v1, u0, 50 if seed % 4 == 2 else u1))
+
+    prediction, true = box(), box()
+    of_prediction, of_true = boundary_map(prediction > 0), boundary_map(true > 0)
+    radius = tolerance(true.shape)
+    scores = score(prediction, true)
+    assert scores.boundary_precision == np.mean(dilate(of_true, radius)[of_prediction])
+    assert scores.boundary_recall == np.mean(dilate(of_prediction, radius)[of_true])
 
 
 def test_objects_without_overlap_are_paired_in_the_order_of_their_labels():
