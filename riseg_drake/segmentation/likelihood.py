@@ -20,6 +20,10 @@ _SEEN = 0.25
 EXPECTED = 2.0
 """Squared residuals of gray and depth, both, where a motion is right."""
 
+_USUAL_MOST = 2 * EXPECTED
+"""Mean squared residual that is usual where a motion is right, at most: more says that most of what stands
+there moves, and is not explained yet. Real films have 1.0 to 1.5, other views up to 2.8."""
+
 
 @dataclass
 class LikelihoodParameters:
@@ -98,6 +102,7 @@ class Costs:
         right, the latter, and nats [N] for each more."""
         asked = self.point_count * (1 - self.lost.min(0)) > parameters.correlated_gray
         level = float(np.median(self.misfit.min(0)[asked])) if asked.any() else EXPECTED
+        level = min(level, _USUAL_MOST)
         dispersion = max(1.0, level / EXPECTED)
         scale = self.point_count / (2 * parameters.correlated_gray * dispersion)
         return self.misfit + self.lost * (level - EXPECTED), level, scale

@@ -162,3 +162,15 @@ def test_light_is_freer_the_farther_the_view_is_another_one(
     f = (w * 120 * 132 / 8 + c) / (w * 120**2 / 8 + c)
     expected = (132 - 120 * f) ** 2 / 8 / f**2 + c * (f - 1) ** 2 / w + 1 - 3 / 14
     np.testing.assert_allclose(misfit[points > 0], np.minimum(expected, 9 + 1 - 3 / 14), rtol=0.02)
+
+
+def test_where_most_is_explained_by_nothing_yet_that_is_not_taken_for_noise():
+    # Ten superpixels of 12 points each, two nats a squared residual, of which a motion explains three.
+    misfit = np.full((2, 10), 9.0)
+    misfit[1, :3] = 1.0
+    costs = Costs(misfit, np.full(10, 12.0), np.zeros((2, 10)), np.zeros(10))
+    parameters = LikelihoodParameters(chance=1.5, correlated_gray=3.0, superpixel_max=99.0)
+    # What is usual is twice what is expected at most, 4, so that 6 may be by chance, and it disperses by 2.
+    expected = np.zeros((2, 10))
+    expected[0, :3] = (9 - 6) * 12 / (2 * 3 * 2)
+    np.testing.assert_allclose(costs.nats(parameters), expected)
