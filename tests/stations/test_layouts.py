@@ -9,7 +9,7 @@ from riseg_drake.stations import layouts
 from riseg_drake.stations.footprint import Footprint, separation
 from riseg_drake.stations.layouts import Habit, centred, lay_out, main_direction
 
-SQUARED, SLIDING = Habit(right_angles=True), Habit(right_angles=True, slides=True)
+LOOSE, SQUARED, SLIDING = Habit(), Habit(right_angles=True), Habit(slides=True)
 GAP = 0.002
 
 
@@ -41,21 +41,24 @@ class Chosen:
         return np.floor(self.uniform(low, high, size)).astype(int)
 
 
-AHEAD, UP, BACK, DOWN = 0.0, 0.25, 0.5, 0.75
-"""Ways along a grid, as shares: towards +x, +y, -x, -y."""
+BACK, DOWN, AHEAD, UP = 0.0, 0.25, 0.5, 0.75
+"""Ways towards -x, -y, +x, +y, as shares of a turn from -pi."""
 
 
-def way(heading, x=0.0, y=0.0, quarter=0.0):
-    """A way in along the grid; x and y are how far the middle is missed, of -1 to 1."""
-    return [quarter, heading, (x + 1) / 2, (y + 1) / 2]
+def way(heading, x=0.0, y=0.0):
+    """A way in, unturned; x and y are how far the middle is missed, of -1 to 1."""
+    return [0.5, heading, (x + 1) / 2, (y + 1) / 2]
 
 
-def along_grid(shapes, ways, habit=SQUARED, gap=GAP, grid=0.5):
-    """Things laid along a grid, as a share of a turn from -pi; `ways` has those of each after the first."""
-    rng = Chosen(grid, *np.ravel([[*given, *[given[-1]] * (24 - len(given))] for given in ways]))
+def places(shapes, ways, habit=LOOSE, gap=GAP):
+    """Where things come to lie, the first unturned; `ways` are those of each after it."""
+    rng = Chosen(0.5, *np.ravel([[*given, *[given[-1]] * (24 - len(given))] for given in ways]))
     spots = lay_out(shapes, [gap] * len(shapes), habit, rng)
-    assert spots is None or rng.shares == []
-    return spots
+    if spots is None:
+        return None
+    assert rng.shares == []
+    assert [yaw for yaw, _ in spots] == [0.0] * len(shapes)
+    return [xy for _, xy in spots]
 
 
 @pytest.mark.parametrize(
@@ -63,41 +66,51 @@ def along_grid(shapes, ways, habit=SQUARED, gap=GAP, grid=0.5):
     [(AHEAD, (-1, 0)), (UP, (0, -1)), (BACK, (1, 0)), (DOWN, (0, 1))],
 )
 def test_the_first_stands_in_the_middle_and_the_next_a_gap_from_it_on_the_side_it_comes_from(heading, place):
-    (yaw, first), (_, second) = along_grid([CUBE, CUBE], [[way(heading)]])
-    assert np.sin(2 * yaw) == pytest.approx(0)
-    assert first == pytest.approx(np.zeros(2))
+    first, second = places([CUBE, CUBE], [[way(heading)]])
+    np.testing.assert_array_equal(first, [0, 0])
     assert second == pytest.approx((0.1 + GAP) * np.array(place), abs=1e-12)
 
 
 def test_a_way_in_misses_the_middle_by_up_to_three_centimetres():
     for y in (-1.0, 0.3, 1.0):
-        (_, (_, second)) = along_grid([CUBE, CUBE], [[way(AHEAD, 0.7, y)]])
+        _, second = places([CUBE, CUBE], [[way(AHEAD, 0.7, y)]])
         assert second == pytest.approx([-0.1 - GAP, 0.03 * y])
 
 
 def test_things_laid_flush_start_a_tenth_of_a_millimetre_apart():
-    (_, (_, second)) = along_grid([CUBE, CUBE], [[way(AHEAD)]], gap=0.0)
+    _, second = places([CUBE, CUBE], [[way(AHEAD)]], gap=0.0)
     assert second == pytest.approx([-0.1 - 1e-4, 0], abs=1e-12)
 
 
 def test_the_middle_is_that_of_all_that_lies_there():
     ways = [[way(BACK)], [way(DOWN)]]
-    spots = along_grid([rectangle(0.3, 0.1), CUBE, CUBE], ways)
-    assert spots[1][1] == pytest.approx([0.2 + GAP, 0], abs=1e-12)
-    assert spots[2][1] == pytest.approx([(0.2 + GAP) / 2, 0.1 + GAP])
+    spots = places([rectangle(0.3, 0.1), CUBE, CUBE], ways)
+    assert spots[1] == pytest.approx([0.2 + GAP, 0], abs=1e-12)
+    assert spots[2] == pytest.approx([(0.2 + GAP) / 2, 0.1 + GAP])
 
 
-def test_all_sides_are_along_a_grid_however_they_were_modelled():
-    ways = [[way(AHEAD, quarter=0.25)], [way(UP, quarter=0.99)], [way(0.99)]]
+@pytest.mark.parametrize(("share", "quarters"), [(0.0, 0), (0.3, 1), (0.74, 2), (0.99, 3)])
+def test_put_away_things_come_in_along_a_grid_turned_by_quarters_against_each_other(share, quarters):
+    wedge = Footprint((np.array([[0, 0], [0.1, 0], [0, 0.05]]),), 0.0)
+    grid = 0.5 + 0.2 / (2 * np.pi)
+    unturned, turned = (
+        lay_out([CUBE, wedge], [GAP] * 2, SQUARED, Chosen(grid, *[k, 0.0, 0.5, 0.5] * 24))[1][0]
+        for k in (0.0, share)
+    )
+    assert turned - unturned == pytest.approx(quarters * np.pi / 2)
+    (_, second) = lay_out([CUBE, CUBE], [GAP] * 2, SQUARED, Chosen(grid, *[0.0, share, 0.5, 0.5] * 24))
+    heading = 0.2 + quarters * np.pi / 2
+    assert second[1] == pytest.approx(-(0.1 + GAP) * np.array([np.cos(heading), np.sin(heading)]))
+
+
+@pytest.mark.parametrize("habit", [SQUARED, Habit(right_angles=True, slides=True)])
+def test_put_away_things_have_parallel_sides_and_faces_a_gap_apart_however_they_were_modelled(habit):
     shapes = [rectangle(0.10, 0.05, 0.3), rectangle(0.04, 0.08, -0.7), rectangle(0.06, 0.05, 2.0), CUBE]
-    spots = along_grid(shapes, ways, grid=0.5 + 0.2 / (2 * np.pi))
-    for shape, (yaw, xy) in zip(shapes, spots, strict=True):
-        (piece,) = shape.moved(yaw, xy).pieces
-        for side in np.roll(piece, -1, axis=0) - piece:
-            assert np.sin(2 * (np.arctan2(side[1], side[0]) - 0.2)) == pytest.approx(0, abs=1e-9)
-    # The second comes in along the grid, turned by a quarter against the first.
-    assert spots[1][1] / np.linalg.norm(spots[1][1]) == pytest.approx([-np.cos(0.2), -np.sin(0.2)])
+    spots = lay_out(shapes, [GAP] * 4, habit, np.random.default_rng(3))
     laid = [shape.moved(*spot) for shape, spot in zip(shapes, spots, strict=True)]
+    sides = np.vstack([np.roll(each.corners(), -1, axis=0) - each.corners() for each in laid])
+    angles = np.arctan2(*sides.T[::-1])
+    np.testing.assert_allclose(np.sin(2 * (angles - angles[0])), 0, atol=1e-9)
     assert [min(separation(a, b) for b in laid[:k]) for k, a in enumerate(laid) if k] == pytest.approx(
         [GAP] * 3
     )
@@ -120,38 +133,38 @@ def test_without_a_grid_yaw_and_way_are_any():
 def test_of_all_ways_in_the_one_that_ends_nearest_to_the_middle_is_taken(number):
     ways = [way(AHEAD)] * 24
     ways[number] = way(UP)
-    (_, (_, second)) = along_grid([rectangle(0.4, 0.1), CUBE], [ways])
+    _, second = places([rectangle(0.4, 0.1), CUBE], [ways])
     assert second == pytest.approx([0, -0.1 - GAP], abs=1e-12)
 
 
 def test_nearest_is_told_by_the_farthest_corner():
     # Modelled from its left end on: with that end 3 cm off the middle, the other is 3 cm nearer.
     long = rectangle(0.2, 0.02).moved(0.0, np.array([0.1, 0.0]))
-    (_, (_, second)) = along_grid([CUBE, long], [[way(UP), way(UP, x=-1), way(UP)]])
+    _, second = places([CUBE, long], [[way(UP), way(UP, x=-1), way(UP)]])
     assert second == pytest.approx([-0.03, -0.06 - GAP])
 
 
 def test_ways_that_meet_nothing_are_none():
-    assert along_grid([SMALL, SMALL], [[way(AHEAD, y=1.0)]]) is None
-    (_, (_, second)) = along_grid([SMALL, SMALL], [[way(AHEAD, y=1.0)] * 5 + [way(AHEAD)]])
+    assert places([SMALL, SMALL], [[way(AHEAD, y=1.0)]]) is None
+    _, second = places([SMALL, SMALL], [[way(AHEAD, y=1.0)] * 5 + [way(AHEAD)]])
     assert second == pytest.approx([-0.02 - GAP, 0], abs=1e-12)
 
 
-@pytest.mark.parametrize("habit", [SQUARED, SLIDING])
+@pytest.mark.parametrize("habit", [LOOSE, SLIDING])
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize("heading", [UP, DOWN])
 def test_what_slides_goes_on_to_the_next_thing_on_the_side_of_the_middle(habit, side, heading):
     # A low wall, a high one at its end, and a cube that comes down on the low one, 3 cm from the high one.
     shapes, low = [rectangle(0.3, 0.1), rectangle(0.1, 0.4), CUBE], 1 if heading == DOWN else -1
-    spots = along_grid(shapes, [[way(BACK if side > 0 else AHEAD)], [way(heading, x=-side)]], habit)
+    spots = places(shapes, [[way(BACK if side > 0 else AHEAD)], [way(heading, x=-side)]], habit)
     # Its middle is that of both, 0.1 + GAP / 2; less 3 cm it lands there, and slid it stands GAP from the wall.
-    x = 0.07 + GAP / 2 if habit is SQUARED else 0.1
-    assert spots[1][1] == pytest.approx([side * (0.2 + GAP), 0], abs=1e-12)
-    assert spots[2][1] == pytest.approx([side * x, low * (0.1 + GAP)])
+    x = 0.07 + GAP / 2 if habit is LOOSE else 0.1
+    assert spots[1] == pytest.approx([side * (0.2 + GAP), 0], abs=1e-12)
+    assert spots[2] == pytest.approx([side * x, low * (0.1 + GAP)])
 
 
 def test_what_finds_no_second_contact_stays_where_it_touched():
-    (_, (_, second)) = along_grid([CUBE, CUBE], [[way(AHEAD, y=1.0)]], SLIDING)
+    _, second = places([CUBE, CUBE], [[way(AHEAD, y=1.0)]], SLIDING)
     assert second == pytest.approx([-0.1 - GAP, 0.03])
 
 
@@ -159,17 +172,17 @@ def test_what_finds_no_second_contact_stays_where_it_touched():
 def test_what_stands_near_enough_to_a_second_thing_does_not_slide(width, x):
     # As above, with 2 cm: it lands at 0.11 less 3 cm, and the wall is at 0.17: 1.8 cm or 3 cm are left.
     shapes = [rectangle(0.3, 0.1), rectangle(0.1, 0.4), rectangle(width, 0.1)]
-    spots = along_grid(shapes, [[way(BACK)], [way(DOWN, x=-1)]], SLIDING, gap=0.02)
-    assert spots[2][1] == pytest.approx([x, 0.12])
+    spots = places(shapes, [[way(BACK)], [way(DOWN, x=-1)]], SLIDING, gap=0.02)
+    assert spots[2] == pytest.approx([x, 0.12])
 
 
 def test_of_those_that_slid_the_nearest_then_is_taken():
     # Its farthest corner is 16.5 cm from the middle if it comes from below, where nothing stops a slide; from
     # above 16.7 cm at first, and 15.6 cm where it has slid up to the wall.
-    shapes = [rectangle(0.3, 0.1), rectangle(0.1, 0.12).moved(0.0, np.array([0.0, 0.01])), CUBE]
-    ways = [[way(BACK)], [way(UP), way(DOWN, x=-1), way(UP)]]
-    spots = along_grid(shapes, ways, SLIDING)
-    assert spots[2][1] == pytest.approx([0.1, 0.1 + GAP])
+    shapes = [rectangle(0.3, 0.1), rectangle(0.1, 0.12), CUBE]
+    ways = [[way(BACK, y=1 / 3)], [*[way(UP)] * 5, way(DOWN, x=-1)]]
+    spots = places(shapes, ways, SLIDING)
+    assert spots[2] == pytest.approx([0.1, 0.1 + GAP])
 
 
 class Face:
@@ -206,7 +219,7 @@ def test_steps_back_are_a_tenth_of_a_millimetre_at_least():
 
 def test_each_stands_off_by_a_gap_of_its_own():
     rng = Chosen(0.5, *way(AHEAD) * 24, *way(BACK) * 24)
-    (_, second), (_, third) = lay_out([CUBE] * 3, iter([9.0, 0.001, 0.004]), SQUARED, rng)[1:]
+    (_, second), (_, third) = lay_out([CUBE] * 3, iter([9.0, 0.001, 0.004]), LOOSE, rng)[1:]
     assert second == pytest.approx([-0.101, 0], abs=1e-12)
     assert third == pytest.approx([0.104, 0], abs=1e-12)
 
