@@ -144,6 +144,18 @@ def test_nearest_is_told_by_the_farthest_corner():
     assert second == pytest.approx([-0.03, -0.06 - GAP])
 
 
+@pytest.mark.parametrize("habit", [LOOSE, SLIDING])
+def test_nearest_is_meant_from_the_middle_of_all_and_not_of_the_first(habit):
+    # Onto two cubes side by side: amid them, and not 3 cm to the side of the first.
+    ways = [[way(BACK)], [way(DOWN), way(DOWN, x=-1)]]
+    assert places([CUBE] * 3, ways, habit)[2] == pytest.approx([0.05 + GAP / 2, 0.1 + GAP])
+
+
+def test_each_keeps_off_the_one_before_it():
+    row = places([CUBE] * 4, [[way(BACK)]] * 3)
+    np.testing.assert_allclose(row, [[k * (0.1 + GAP), 0] for k in range(4)], atol=1e-12)
+
+
 def test_ways_that_meet_nothing_are_none():
     assert places([SMALL, SMALL], [[way(AHEAD, y=1.0)]]) is None
     _, second = places([SMALL, SMALL], [[way(AHEAD, y=1.0)] * 5 + [way(AHEAD)]])
@@ -161,6 +173,13 @@ def test_what_slides_goes_on_to_the_next_thing_on_the_side_of_the_middle(habit, 
     x = 0.07 + GAP / 2 if habit is LOOSE else 0.1
     assert spots[1] == pytest.approx([side * (0.2 + GAP), 0], abs=1e-12)
     assert spots[2] == pytest.approx([side * x, low * (0.1 + GAP)])
+
+
+def test_what_came_in_beyond_the_middle_slides_back_to_it():
+    # It lands between the high wall on the left and the middle, and goes away from the wall: nothing is there.
+    shapes = [rectangle(0.3, 0.1), rectangle(0.1, 0.4), SMALL]
+    spots = places(shapes, [[way(AHEAD)], [way(DOWN, x=-1)]], SLIDING)
+    assert spots[2] == pytest.approx([-0.13 - GAP / 2, 0.06 + GAP])
 
 
 def test_what_finds_no_second_contact_stays_where_it_touched():
