@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.segmentation.superpixels import Superpixels
+from riseg_drake.segmentation.superpixels import Superpixels, touching
 
 
 @dataclass(frozen=True)
@@ -30,10 +30,6 @@ class BorderPixels:
 
 def border_pixels(cut: Superpixels) -> Iterator[BorderPixels]:
     """Those along v, then those along u."""
-    label, borders = cut.label, cut.borders
-    code = borders[:, 0] * cut.count + borders[:, 1]  # rising, as the superpixels list them
-    for axis in (0, 1):
-        a, b = (label[:-1], label[1:]) if axis == 0 else (label[:, :-1], label[:, 1:])
-        vu = np.stack(np.nonzero((a != b) & (a >= 0) & (b >= 0)))
-        low, high = np.minimum(a[*vu], b[*vu]), np.maximum(a[*vu], b[*vu])
-        yield BorderPixels(np.searchsorted(code, low * cut.count + high), vu, axis)
+    code = cut.borders[:, 0] * cut.count + cut.borders[:, 1]  # rising, as the superpixels list them
+    for axis, (pixel, low, high) in enumerate(touching(cut.label)):
+        yield BorderPixels(np.searchsorted(code, low * cut.count + high), pixel, axis)

@@ -53,7 +53,7 @@ def border_cues(keyframe: Keyframe) -> NDArray[np.float64]:
     sides; means along each border, saturated."""
     region, count, borders = keyframe.region, keyframe.count, keyframe.borders
     label = keyframe.superpixels.label
-    height = cv2.medianBlur(keyframe.height, 5)
+    height = keyframe.height
     color = cv2.GaussianBlur(keyframe.frame.color[region], (0, 0), 1.0).astype(np.float32)
     measured = keyframe.frame.depth[region] > 0
     sums, pixels = np.zeros((4, len(borders))), np.zeros(len(borders))

@@ -49,7 +49,8 @@ class Keyframe(Immutable):
     region: Region
     """The part of the view that is cut: all that stands there."""
     height: NDArray[np.float32]
-    """[h, w] of the region, m above the table; what stands there without depth is as high as what is near."""
+    """[h, w] of the region, m above the table, medians of five by five pixels; what stands there without depth
+    is as high as what is near."""
     superpixels: Superpixels
     """Of the region."""
     over: NDArray[np.bool_]
@@ -127,8 +128,8 @@ def make_keyframe(
     cut = superpixels(frame.color[region], height, above.mask[region], size)
     if bodies is not None:
         cut = split_superpixels(cut, bodies[region])
-    smooth = cv2.medianBlur(height, 5)
-    cut = with_occlusions(cut, smooth, parameters.behind)
+    height = cv2.medianBlur(height, 5)
+    cut = with_occlusions(cut, height, parameters.behind)
     owner = np.full(above.mask.shape, -1, np.intp)
     owner[region] = cut.label
     variance = gray_variance(frame.gradient_squared, noise)
@@ -143,7 +144,7 @@ def make_keyframe(
         region=region,
         height=height,
         superpixels=cut,
-        over=may_lie_on(cut, smooth),
+        over=may_lie_on(cut, height),
         area=np.bincount(cut.label[cut.label >= 0], minlength=cut.count),
         points=points,
         owner=owner[v, u],

@@ -1,5 +1,6 @@
 """Small pieces of an image that follow its edges: the pixels of a blank surface decide together."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import cv2
@@ -74,13 +75,22 @@ def _edges_image(color: NDArray[np.uint8], height: NDArray[np.float32]) -> NDArr
     return np.stack([gray, warm.astype(np.uint8), cv2.medianBlur(levels, 5)], axis=-1)
 
 
+def touching(
+    label: NDArray[np.intp],
+) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]]:
+    """Where two pieces of a label image [H, W] touch, along v, then along u: the pixel (v, u) [2, K] before the
+    border, and the smaller and the larger number [K] of the two."""
+    for a, b in ((label[:-1], label[1:]), (label[:, :-1], label[:, 1:])):
+        pixel = np.stack(np.nonzero((a != b) & (a >= 0) & (b >= 0)))
+        a, b = a[*pixel], b[*pixel]
+        yield pixel, np.minimum(a, b), np.maximum(a, b)
+
+
 def _with_borders(label: NDArray[np.intp], count: int) -> Superpixels:
     """Find which pieces touch, and along how many pixels."""
     size = max(count, 1) ** 2
     length = np.zeros(size)
-    for a, b in ((label[:-1], label[1:]), (label[:, :-1], label[:, 1:])):
-        touch = (a != b) & (a >= 0) & (b >= 0)
-        low, high = np.minimum(a[touch], b[touch]), np.maximum(a[touch], b[touch])
+    for _, low, high in touching(label):
         length += np.bincount(low * count + high, minlength=size)
     code = np.flatnonzero(length)
     borders = np.stack(np.divmod(code, max(count, 1)), axis=1)
@@ -93,9 +103,9 @@ def with_occlusions(cut: Superpixels, height: NDArray[np.float32], level: float)
     `height` [H, W], m above the table; surfaces on both sides are as high as each other within `level`, m.
     """
     pairs, width = seen_in_pieces(cut.label, height, level)
-    code, touching = (p[:, 0] * cut.count + p[:, 1] for p in (pairs, cut.borders))
-    new = ~np.isin(code, touching)
-    order = np.argsort(np.concatenate([touching, code[new]]), kind="stable")
+    code, known = (p[:, 0] * cut.count + p[:, 1] for p in (pairs, cut.borders))
+    new = ~np.isin(code, known)
+    order = np.argsort(np.concatenate([known, code[new]]), kind="stable")
     return replace(
         cut,
         borders=np.concatenate([cut.borders, pairs[new]])[order],

@@ -63,8 +63,7 @@ def in_a_hollow(height: NDArray[np.float32]) -> NDArray[np.bool_]:
     few = np.pad(height[::_COARSE, ::_COARSE], 1)  # all around it is the table
     hollow = np.zeros(few.shape, bool)
     for level in np.arange(LOWEST, float(few.max(initial=0.0)), LOWEST):
-        low = few <= level
-        label = cv2.connectedComponents(low.view(np.uint8), connectivity=4)[1]
-        hollow |= low & (label != label[0, 0]) & (few < level - LOWEST)
+        label = cv2.connectedComponents((few <= level).view(np.uint8), connectivity=4)[1]
+        hollow |= (few < level - LOWEST) & (label != label[0, 0])
     inner = hollow[1:-1, 1:-1].repeat(_COARSE, axis=0).repeat(_COARSE, axis=1)
     return inner[: height.shape[0], : height.shape[1]]

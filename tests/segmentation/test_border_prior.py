@@ -22,7 +22,7 @@ def two_halves(
         count=2,
         borders=cut.borders,
         superpixels=cut,
-        height=height.astype(np.float32),
+        height=cv2.medianBlur(height.astype(np.float32), 5),
         area=np.array([800, 800]),
         frame=SimpleNamespace(color=color, depth=np.ones((40, 40), np.float32) if depth is None else depth),
     )

@@ -4,9 +4,9 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 import numpy as np
-from pydrake.common.value import AbstractValue
+from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import DiagramBuilder, LeafSystem
+from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import VectorLogSink
 
 from riseg_drake.geometry.camera import Intrinsics
@@ -45,6 +45,17 @@ def push_to(q_there, start_offset=0.0, at=0.0, limits=None):
         cost=0.0,
         path=PushPath(there, push_start=middle / 2, push_end=middle),
     )
+
+
+def show_still(motion: ArmMotion, context: Context, time: float) -> None:
+    """One frame, taken at a time, s, in which nothing has an id, and the push that was found in it."""
+    frame = Frame(1, time, CAMERA, None, np.ones((4, 4), np.float32), np.eye(4), np.zeros((4, 4), bool))
+    for name, value in {
+        "decision": Decision(push_to(THERE), unsettled_area=0.01),
+        "pair": FramePair(frame, frame),
+        "mask": np.zeros((4, 4), np.uint16),
+    }.items():
+        motion.GetInputPort(name).FixValue(context, Value[object](value))
 
 
 @dataclass

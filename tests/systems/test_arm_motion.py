@@ -2,11 +2,9 @@
 
 import numpy as np
 import pytest
-from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.pushing.arm_path import ArmPhase
 from riseg_drake.pushing.decision import Decision, Ending
 from riseg_drake.pushing.push import NO_PUSH
@@ -14,7 +12,6 @@ from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest
 from riseg_drake.robot.limits import PANDA_LIMITS
 from riseg_drake.systems.arm_motion import ArmMotion, ArmMotionParameters, Permission
 from tests.systems.scripted_eyes import (
-    CAMERA,
     NOTHING_LEFT,
     Q_OBSERVE,
     THERE,
@@ -22,6 +19,7 @@ from tests.systems.scripted_eyes import (
     Script,
     push_to,
     run,
+    show_still,
 )
 
 
@@ -86,13 +84,7 @@ def test_without_a_word_on_rest_every_mask_counts():
     motion = ArmMotion(Q_OBSERVE)
     simulator = Simulator(motion)
     context = simulator.get_mutable_context()
-    frame = Frame(5, 0.4, CAMERA, None, np.ones((4, 4), np.float32), np.eye(4), np.zeros((4, 4), bool))
-    for name, value in {
-        "decision": Decision(push_to(THERE), unsettled_area=0.01),
-        "pair": FramePair(frame, frame),
-        "mask": np.zeros((4, 4), np.uint16),
-    }.items():
-        motion.GetInputPort(name).FixValue(context, Value[object](value))
+    show_still(motion, context, time=0.4)
     motion.GetInputPort("position_measured").FixValue(context, Q_OBSERVE)
     simulator.AdvanceTo(0.5)
     assert motion.GetOutputPort("active_push").Eval(context) is not NO_PUSH

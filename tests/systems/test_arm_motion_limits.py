@@ -4,11 +4,9 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
 from pydrake.trajectories import PiecewisePolynomial
 
-from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.pushing.arm_path import ArmPhase
 from riseg_drake.pushing.decision import Decision, Ending
 from riseg_drake.pushing.push import NO_PUSH
@@ -23,6 +21,7 @@ from tests.systems.scripted_eyes import (
     Script,
     push_to,
     run,
+    show_still,
     wired,
 )
 
@@ -66,13 +65,7 @@ def test_an_arm_rests_where_every_joint_is_within_a_hundredth_rad(joint, off, re
     motion = ArmMotion(Q_OBSERVE)
     simulator = Simulator(motion)
     context = simulator.get_mutable_context()
-    frame = Frame(1, 1.0, CAMERA, None, np.ones((4, 4), np.float32), np.eye(4), np.zeros((4, 4), bool))
-    for name, value in {
-        "decision": Decision(push_to(THERE), unsettled_area=0.01),
-        "pair": FramePair(frame, frame),
-        "mask": np.zeros((4, 4), np.uint16),
-    }.items():
-        motion.GetInputPort(name).FixValue(context, Value[object](value))
+    show_still(motion, context, time=1.0)
     measured = Q_OBSERVE.copy()
     measured[joint] += off
     motion.GetInputPort("position_measured").FixValue(context, measured)
@@ -86,14 +79,11 @@ def test_an_arm_that_was_moved_meanwhile_rests_anew():
     context = simulator.get_mutable_context()
 
     def show(until, measured, time=-1.0):
-        frame = Frame(1, time, CAMERA, None, np.ones((4, 4), np.float32), np.eye(4), np.zeros((4, 4), bool))
-        motion.GetInputPort("pair").FixValue(context, Value[object](FramePair(frame, frame)))
+        show_still(motion, context, time)
         motion.GetInputPort("position_measured").FixValue(context, measured)
         simulator.AdvanceTo(until)
         return motion.GetOutputPort("active_push").Eval(context)
 
-    motion.GetInputPort("decision").FixValue(context, Value[object](Decision(push_to(THERE))))
-    motion.GetInputPort("mask").FixValue(context, Value[object](np.zeros((4, 4), np.uint16)))
     show(0.11, Q_OBSERVE)
     show(0.21, Q_OBSERVE + 0.1)
     show(0.31, Q_OBSERVE)  # at rest again since the look at 7/30 s
