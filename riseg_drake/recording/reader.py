@@ -23,6 +23,7 @@ from riseg_drake.host.files import (
 )
 from riseg_drake.host.images import MOST_BYTES, DamagedImageError, ImageKind, decode, image_kind, png_kind
 from riseg_drake.recording import layout
+from riseg_drake.recording.bop_scene import SCENE_CAMERA, read_bop_scene
 from riseg_drake.recording.image_lists import ImageLists, image_lists
 from riseg_drake.recording.layout import LeftOut, RecordedFrame, RecordingError
 from riseg_drake.recording.registration import Registration, registration_from_json
@@ -70,23 +71,45 @@ class RecordingReader(RecordedSource):
         """What was passed over so far, in the order in which it was found."""
         self.warnings: list[str] = []
         """What is possible, but odd."""
-        self._registration, self.depth_scale = _read_camera(folder / layout.CAMERA_FILE, self._inside)
-        self.intrinsics = self._registration.intrinsics
-        camera_file = folder / layout.CAMERA_FILE
-        self.warnings += [f"{camera_file}: {odd}" for odd in layout.unlikely_camera(self.intrinsics)]
         self._stamp_limit = self._options.stamp_limit
-        self.poses = self._table(layout.POSE_LIST, columns=8)
-        """The camera's poses, None without groundtruth.txt."""
-        if self.poses is not None:
-            _check_rigid(self.poses)
-        self.joints = self._table(layout.JOINT_LIST, columns=None, separator=",")
+        self.poses: StampedTable | None
+        """The camera's poses, None without any."""
+        self.joints: StampedTable | None
         """The joint angles, None without joints.csv."""
-        self.camera_poses = None if self.poses is None else layout.POSE_LIST
-        self._lists = image_lists(folder, self._options, self._inside)
+        if os.path.lexists(folder / SCENE_CAMERA) and not os.path.lexists(folder / layout.CAMERA_FILE):
+            self._read_scene()
+        else:
+            self._read_layout()
+        self.intrinsics = self._registration.intrinsics
         self.left_out += self._lists.left_out
         self._color_list = self._lists.color_file
+        self.warnings += [f"{self._camera_file}: {odd}" for odd in layout.unlikely_camera(self.intrinsics)]
         self._frames = self._associated(self._lists, self._stamp_limit)
         self._check_headers()
+
+    def _read_layout(self) -> None:
+        """Camera, poses, joints and images as the project's own layout has them."""
+        self._camera_file = self.folder / layout.CAMERA_FILE
+        self._registration, self.depth_scale = _read_camera(self._camera_file, self._inside)
+        self.poses = self._table(layout.POSE_LIST, columns=8)
+        if self.poses is not None:
+            _check_rigid(self.poses)
+        self.camera_poses = None if self.poses is None else layout.POSE_LIST
+        self.joints = self._table(layout.JOINT_LIST, columns=None, separator=",")
+        self._lists = image_lists(self.folder, self._options, self._inside)
+
+    def _read_scene(self) -> None:
+        """The same of a scene of the BOP data sets."""
+        self._camera_file = self.folder / SCENE_CAMERA
+        self._lists = image_lists(self.folder, self._options, self._inside)
+        first, rate = self.folder / self._lists.color[0].name, self._options.rate
+        if rate is None:
+            raise RecordingError(
+                f"{self.folder} is a BOP scene; --rate HZ says how many images a second it has"
+            )
+        scene = read_bop_scene(self.folder, first, rate, self._inside)
+        self._registration, self.depth_scale, self.poses = scene.registration, scene.depth_scale, scene.poses
+        self.camera_poses = None if self.poses is None else SCENE_CAMERA
 
     def __len__(self) -> int:
         """How many frames there are to read; those that turn out to be damaged are among them."""
@@ -117,7 +140,7 @@ class RecordingReader(RecordedSource):
                 self.leave_out(color, str(damage))
                 continue
             if frames == 0:
-                self._look_at_scale(frame.depth, self.folder / layout.CAMERA_FILE)
+                self._look_at_scale(frame.depth, self._camera_file)
             frames += 1
             yield frame
         if frames == 0:
@@ -244,7 +267,7 @@ class RecordingReader(RecordedSource):
         height, width = right or self.intrinsics.shape
         if shape != (height, width):
             raise RecordingError(
-                f"{where} has {shape[1]}x{shape[0]} pixels, but {layout.CAMERA_FILE} says {width}x{height}"
+                f"{where} has {shape[1]}x{shape[0]} pixels, but {self._camera_file.name} says {width}x{height}"
             )
 
     def leave_out(self, color: ListedFile | RecordedFrame, why: str) -> None:
@@ -284,8 +307,9 @@ class RecordingReader(RecordedSource):
         return decode(content, str(path), jpeg=jpeg)
 
     def _beside(self, folder: str, color_name: str) -> Path:
-        """The image in another folder that has the name of a colour image."""
-        return self.folder / folder / Path(color_name).name
+        """The image in another folder that has the name of a colour image, or its stem, as of a JPEG."""
+        path = self.folder / folder / Path(color_name).name
+        return path if is_file(path) else path.with_suffix(".png")
 
     def _read_beside(self, folder: str, color_name: str) -> NDArray[np.uint16] | None:
         path = self._beside(folder, color_name)

@@ -133,7 +133,7 @@ def row_between(table: StampedTable, time: float, limit: float) -> NDArray[np.fl
     return q + share * (table.values[j] - q) if share > 0 else q
 
 
-def nearest_time(times: NDArray[np.float64], time: float) -> int:
+def nearest_time(times: NDArray, time: float) -> int:
     """Which of N > 0 rising times [N] is the nearest."""
     j = int(np.searchsorted(times, time))
     return min((k for k in (j - 1, j) if 0 <= k < len(times)), key=lambda k: abs(times[k] - time))
