@@ -1,6 +1,5 @@
 """Reads a recording frame by frame, in the order of its colour images."""
 
-import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,21 +11,19 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.rgbd import sanitize_depth
 from riseg_drake.host.depth_files import DEPTH_TYPES, decode_depth
 from riseg_drake.host.files import (
-    MOST_SETTINGS,
     FileError,
     LeadsOutError,
-    MissingFileError,
     check_inside,
     is_file,
     read_bytes,
-    read_text,
 )
 from riseg_drake.host.images import MOST_BYTES, DamagedImageError, ImageKind, decode, image_kind, png_kind
 from riseg_drake.recording import layout
 from riseg_drake.recording.bop_scene import SCENE_CAMERA, read_bop_scene
+from riseg_drake.recording.camera_file import read_camera
 from riseg_drake.recording.image_lists import ImageLists, image_lists
 from riseg_drake.recording.layout import LeftOut, RecordedFrame, RecordingError
-from riseg_drake.recording.registration import Registration, registration_from_json
+from riseg_drake.recording.registration import Registration
 from riseg_drake.recording.source import STAMP_LIMIT, RecordedSource, SourceOptions
 from riseg_drake.recording.stamped_lists import (
     FEW,
@@ -90,7 +87,7 @@ class RecordingReader(RecordedSource):
     def _read_layout(self) -> None:
         """Camera, poses, joints and images as the project's own layout has them."""
         self._camera_file = self.folder / layout.CAMERA_FILE
-        self._registration, self.depth_scale = _read_camera(self._camera_file, self._inside)
+        self._registration, self.depth_scale = read_camera(self._camera_file, self._inside)
         self.poses = self._table(layout.POSE_LIST, columns=8)
         if self.poses is not None:
             _check_rigid(self.poses)
@@ -101,12 +98,12 @@ class RecordingReader(RecordedSource):
     def _read_scene(self) -> None:
         """The same of a scene of the BOP data sets."""
         self._camera_file = self.folder / SCENE_CAMERA
-        self._lists = image_lists(self.folder, self._options, self._inside)
-        first, rate = self.folder / self._lists.color[0].name, self._options.rate
+        rate = self._options.rate
         if rate is None:
-            raise RecordingError(
-                f"{self.folder} is a BOP scene; --rate HZ says how many images a second it has"
-            )
+            raise RecordingError(f"{self.folder} is a BOP scene; --rate HZ says how many images a second")
+        self.joints = self._table(layout.JOINT_LIST, columns=None, separator=",")
+        self._lists = image_lists(self.folder, self._options, self._inside)
+        first = self.folder / self._lists.color[0].name
         scene = read_bop_scene(self.folder, first, rate, self._inside)
         self._registration, self.depth_scale, self.poses = scene.registration, scene.depth_scale, scene.poses
         self.camera_poses = None if self.poses is None else SCENE_CAMERA
@@ -319,26 +316,6 @@ class RecordingReader(RecordedSource):
         if image.ndim != 2 or image.dtype not in (np.uint8, np.uint16):
             raise RecordingError(f"{path}: masks have one channel of 8 or 16 bits")
         return self._registration.registered_mask(image.astype(np.uint16))
-
-
-def _read_camera(path: Path, inside: Path | None) -> tuple[Registration, float]:
-    try:
-        content = json.loads(read_text(path, MOST_SETTINGS, inside))
-    except MissingFileError:
-        raise RecordingError(
-            f"{path} is missing; it holds width, height, fx, fy, cx, cy, depth_scale"
-        ) from None
-    except json.JSONDecodeError as error:
-        raise RecordingError(f"{path}: line {error.lineno} is not JSON ({error.msg})") from None
-    except FileError as error:
-        raise layout.refusal(error) from None
-    except (ValueError, RecursionError):
-        raise RecordingError(f"{path} is no JSON that can be read") from None
-    try:
-        intrinsics, depth_scale = layout.camera_from_json(content)
-        return registration_from_json(content, intrinsics), depth_scale
-    except RecordingError as error:
-        raise RecordingError(f"{path}: {error}") from None
 
 
 def _check_rigid(poses: StampedTable) -> None:
