@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from riseg_drake.app import commands
+from riseg_drake.app.source_options import add_source_options
 
 BAD_INPUT = 2
 """Exit code."""
@@ -175,9 +176,9 @@ def command_line() -> argparse.ArgumentParser:
         "segment",
         commands.segment,
         "Find the objects of a recording, without a robot: masks, a video, and scores where there are labels.\n"
-        "A recording is a folder in the TUM RGB-D layout with a camera.json, see docs/recordings.md.",
+        "A recording is a ROS bag, or a folder of images with a camera.json, see docs/recordings.md.",
     )
-    segment.add_argument("recording", type=Path, metavar="RECORDING", help="its folder")
+    segment.add_argument("recording", type=Path, metavar="RECORDING", help="its folder, or the file of a bag")
     segment.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/segment_NAME)")
     _add_overwrite(segment, "segmentation")
     segment.add_argument(
@@ -198,17 +199,18 @@ def command_line() -> argparse.ArgumentParser:
         metavar="NAME",
         help="frame of that robot: x right, y down, z ahead in the image (camera)",
     )
-    segment.add_argument(
-        "--stamp-limit",
-        type=_seconds,
-        default=0.02,
-        metavar="S",
-        help="how far apart in time what belongs together may be, s (0.02)",
-    )
+    _add_source(segment)
 
-    segment.add_argument(
-        "--follow", action="store_true", help="follow links and paths that lead out of the recording (no)"
+    convert = _add(
+        subparsers,
+        "convert",
+        commands.convert,
+        "Write any recording that `riseg segment` reads as a folder in the project's own layout.\n"
+        "Colour without distortion, depth aligned to it, poses and joint angles as far as there are any.",
     )
+    convert.add_argument("recording", type=Path, metavar="RECORDING", help="its folder, or the file of a bag")
+    convert.add_argument("output", type=Path, metavar="FOLDER", help="a new folder")
+    _add_source(convert)
 
     score = _add(
         subparsers,
@@ -310,6 +312,20 @@ def _seconds(text: str) -> float:
     if not 0 < seconds < 1e6:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds above 0")
     return seconds
+
+
+def _add_source(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--stamp-limit",
+        type=_seconds,
+        default=0.02,
+        metavar="S",
+        help="how far apart in time what belongs together may be, s (0.02)",
+    )
+    command.add_argument(
+        "--follow", action="store_true", help="follow links and paths that lead out of the recording (no)"
+    )
+    add_source_options(command)
 
 
 def _add_overwrite(command: argparse.ArgumentParser, earlier: str) -> None:

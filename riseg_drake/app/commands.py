@@ -86,6 +86,13 @@ def segment(chosen: argparse.Namespace, console: Console) -> None:
     segment_command(_request(SegmentRequest, chosen), console)
 
 
+def convert(chosen: argparse.Namespace, console: Console) -> None:
+    """`riseg convert`."""
+    from riseg_drake.app.segment.convert import ConvertRequest, convert_command
+
+    convert_command(_request(ConvertRequest, chosen), console)
+
+
 def score(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg score`."""
     from riseg_drake.app.evaluate.score import score_command

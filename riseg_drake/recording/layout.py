@@ -69,9 +69,11 @@ class LeftOut:
     file: str
     line: int
     why: str
+    unit: str = "line"
+    """What is counted from 1: lines of a list, images, or messages."""
 
     def __str__(self) -> str:
-        return f"{self.file}: line {self.line} is left out: {self.why}"
+        return f"{self.file}: {self.unit} {self.line} is left out: {self.why}"
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,5 @@
 """Reads a recording frame by frame, in the order of its colour images."""
 
-import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,43 +7,41 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation, Slerp
 
-from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import sanitize_depth
+from riseg_drake.host.depth_files import DEPTH_TYPES, decode_depth
 from riseg_drake.host.files import (
-    MOST_SETTINGS,
     FileError,
     LeadsOutError,
-    MissingFileError,
     check_inside,
     is_file,
     read_bytes,
-    read_text,
 )
 from riseg_drake.host.images import MOST_BYTES, DamagedImageError, ImageKind, decode, image_kind, png_kind
 from riseg_drake.recording import layout
+from riseg_drake.recording.bop_scene import SCENE_CAMERA, read_bop_scene
+from riseg_drake.recording.camera_file import read_camera
+from riseg_drake.recording.image_lists import ImageLists, image_lists
 from riseg_drake.recording.layout import LeftOut, RecordedFrame, RecordingError
+from riseg_drake.recording.registration import Registration
+from riseg_drake.recording.source import STAMP_LIMIT, RecordedSource, SourceOptions
 from riseg_drake.recording.stamped_lists import (
     FEW,
     ListedFile,
     StampedTable,
     nearest_time,
-    read_file_list,
+    pose_between,
     read_table,
+    row_between,
 )
 
-STAMP_LIMIT = 0.02
-"""How far the stamps of what belongs together may lie apart, s; the TUM tools' own value."""
 UNIT_LENGTH_TOLERANCE = 0.01
 """How far the length of a quaternion may be from 1: files round their numbers."""
-LIKELY_DEPTH = (0.1, 10.0)
-"""m; a median depth outside most often means a wrong depth_scale."""
 INVALID = 65535
 """How some cameras spell "no depth", beside 0."""
 
 
-class RecordingReader:
+class RecordingReader(RecordedSource):
     """Streams the frames of a folder; only the lists of stamps are held in memory.
 
     To each colour image belong the depth image with the nearest stamp, and the pose and the joints of its
@@ -54,38 +51,70 @@ class RecordingReader:
     Paths and links that lead out of the folder are refused, unless they are to be followed (`follow`).
     """
 
-    def __init__(self, folder: Path, stamp_limit: float = STAMP_LIMIT, *, follow: bool = False):
+    def __init__(
+        self,
+        folder: Path,
+        stamp_limit: float = STAMP_LIMIT,
+        *,
+        follow: bool = False,
+        options: SourceOptions | None = None,
+    ):
+        self._options = options or SourceOptions(stamp_limit, follow)
         if not os.path.isdir(folder):  # of a name that cannot be, too
             raise RecordingError(f"{folder} is not a folder; a recording is one that holds {layout.COLOR_LIST}")
-        self.folder = folder
-        self._inside = None if follow else folder
+        self.folder = self.path = folder
+        self._inside = None if self._options.follow else folder
         self.left_out: list[LeftOut] = []
         """What was passed over so far, in the order in which it was found."""
         self.warnings: list[str] = []
         """What is possible, but odd."""
-        self.intrinsics, self._depth_scale = _read_camera(folder / layout.CAMERA_FILE, self._inside)
-        camera_file = folder / layout.CAMERA_FILE
-        self.warnings += [f"{camera_file}: {odd}" for odd in layout.unlikely_camera(self.intrinsics)]
-        self._stamp_limit = stamp_limit
-        self._color_list = folder / layout.COLOR_LIST
+        self._stamp_limit = self._options.stamp_limit
+        self.poses: StampedTable | None
+        """The camera's poses, None without any."""
+        self.joints: StampedTable | None
+        """The joint angles, None without joints.csv."""
+        if os.path.lexists(folder / SCENE_CAMERA) and not os.path.lexists(folder / layout.CAMERA_FILE):
+            self._read_scene()
+        else:
+            self._read_layout()
+        self.intrinsics = self._registration.intrinsics
+        self.left_out += self._lists.left_out
+        self._color_list = self._lists.color_file
+        self.warnings += [f"{self._camera_file}: {odd}" for odd in layout.unlikely_camera(self.intrinsics)]
+        self._frames = self._associated(self._lists, self._stamp_limit)
+        self._check_headers()
+
+    def _read_layout(self) -> None:
+        """Camera, poses, joints and images as the project's own layout has them."""
+        self._camera_file = self.folder / layout.CAMERA_FILE
+        self._registration, self.depth_scale = read_camera(self._camera_file, self._inside)
         self.poses = self._table(layout.POSE_LIST, columns=8)
-        """The camera's poses, None without groundtruth.txt."""
         if self.poses is not None:
             _check_rigid(self.poses)
+        self.camera_poses = None if self.poses is None else layout.POSE_LIST
         self.joints = self._table(layout.JOINT_LIST, columns=None, separator=",")
-        """The joint angles, None without joints.csv."""
-        self._frames = self._associated(stamp_limit)
-        self._check_headers()
+        self._lists = image_lists(self.folder, self._options, self._inside)
+
+    def _read_scene(self) -> None:
+        """The same of a scene of the BOP data sets."""
+        self._camera_file = self.folder / SCENE_CAMERA
+        rate = self._options.rate
+        if rate is None:
+            raise RecordingError(f"{self.folder} is a BOP scene; --rate HZ says how many images a second")
+        self.joints = self._table(layout.JOINT_LIST, columns=None, separator=",")
+        self._lists = image_lists(self.folder, self._options, self._inside)
+        first = self.folder / self._lists.color[0].name
+        scene = read_bop_scene(self.folder, first, rate, self._inside)
+        self._registration, self.depth_scale, self.poses = scene.registration, scene.depth_scale, scene.poses
+        self.camera_poses = None if self.poses is None else SCENE_CAMERA
 
     def __len__(self) -> int:
         """How many frames there are to read; those that turn out to be damaged are among them."""
         return len(self._frames)
 
-    @property
-    def rate(self) -> float:
-        """Frames a second, by the median; 1 for a single frame."""
-        times = [color.time for color, _ in self._frames]
-        return float(1 / np.median(np.diff(times))) if len(times) > 1 else 1.0
+    def times(self) -> list[float]:
+        """Of all frames, s."""
+        return [color.time for color, _ in self._frames]
 
     def holds_images(self, folder: str) -> bool:
         """Whether `robot` or `label` is there and holds something. Raises RecordingError if it is no folder."""
@@ -108,7 +137,7 @@ class RecordingReader:
                 self.leave_out(color, str(damage))
                 continue
             if frames == 0:
-                self._look_at_scale(frame.depth)
+                self._look_at_scale(frame.depth, self._camera_file)
             frames += 1
             yield frame
         if frames == 0:
@@ -118,10 +147,10 @@ class RecordingReader:
         robot = self._read_beside(layout.ROBOT_FOLDER, color.name)
         return RecordedFrame(
             time=color.time,
-            color=self._read_color(color.name),
-            depth=self._read_depth(depth.name),
-            X_WC=self._pose_at(color.time),
-            position=self._position_at(color.time),
+            color=self._registration.registered_color(self._read_color(color.name)),
+            depth=self._registration.registered_depth(self._read_depth(depth.name)),
+            X_WC=None if self.poses is None else pose_between(self.poses, color.time, self._stamp_limit),
+            position=None if self.joints is None else row_between(self.joints, color.time, self._stamp_limit),
             robot=None if robot is None else robot > 0,
             labels=self._read_beside(layout.LABEL_FOLDER, color.name),
             name=color.name,
@@ -135,11 +164,9 @@ class RecordingReader:
         self.left_out += read[1]
         return read[0]
 
-    def _associated(self, limit: float) -> list[tuple[ListedFile, ListedFile]]:
+    def _associated(self, lists: ImageLists, limit: float) -> list[tuple[ListedFile, ListedFile]]:
         """Colour and depth images that belong together, where all else that there is belongs to them, too."""
-        color, repeated = read_file_list(self._color_list, self._inside)
-        depth, unordered = read_file_list(self.folder / layout.DEPTH_LIST, self._inside)
-        self.left_out += repeated + unordered
+        color, depth = lists.color, lists.depth
         stamps = {layout.DEPTH_LIST: np.array([entry.time for entry in depth])}
         for table in (self.poses, self.joints):
             if table is not None:
@@ -168,11 +195,8 @@ class RecordingReader:
         present, absent = [], []
         for color, depth in self._frames:
             try:
-                for entry, file, channels, bits in (
-                    (color, layout.COLOR_LIST, (3, 4), 8),
-                    (depth, layout.DEPTH_LIST, (1,), 16),
-                ):
-                    self._check_header(entry, file, channels, bits)
+                self._check_header(color, self._lists.color_file, (3, 4), 8)
+                self._check_header(depth, self._lists.depth_file, (1,), 16, self._registration.depth_shape)
             except DamagedImageError as missing:
                 absent.append((color, str(missing)))
                 continue
@@ -190,15 +214,30 @@ class RecordingReader:
                     if is_file(path):
                         self._check_kind(path, str(path), (1,), (8, 16))
 
-    def _check_header(self, entry: ListedFile, file: str, channels: tuple[int, ...], bits: int) -> None:
+    def _check_header(
+        self,
+        entry: ListedFile,
+        file: Path,
+        channels: tuple[int, ...],
+        bits: int,
+        shape: tuple[int, int] | None = None,
+    ) -> None:
         path = self.folder / entry.name
-        where = f"{self.folder / file}: line {entry.line}: {path}"
-        self._check_leads_nowhere(path, f"{self.folder / file}: line {entry.line}: ")
+        at = f"{file}: {self._lists.unit} {entry.line}: "
+        where = f"{at}{path}"
+        self._check_leads_nowhere(path, at)
         if not is_file(path):
             raise DamagedImageError(f"{path} is missing")
-        self._check_kind(path, where, channels, (bits,))
+        self._check_kind(path, where, channels, (bits,), shape)
 
-    def _check_kind(self, path: Path, where: str, channels: tuple[int, ...], bits: tuple[int, ...]) -> None:
+    def _check_kind(
+        self,
+        path: Path,
+        where: str,
+        channels: tuple[int, ...],
+        bits: tuple[int, ...],
+        shape: tuple[int, int] | None = None,
+    ) -> None:
         try:
             kind = png_kind(path, self._inside)
         except LeadsOutError as error:
@@ -210,7 +249,7 @@ class RecordingReader:
         if kind.channels not in channels or kind.bits not in bits:
             right = f"{' or '.join(map(str, channels[:1]))} channel{'s' if channels[0] > 1 else ''} of "
             raise RecordingError(f"{where} has {kind}; it must have {right}{' or '.join(map(str, bits))} bits")
-        self._check_size((kind.height, kind.width), where)
+        self._check_size((kind.height, kind.width), where, shape)
 
     def _check_leads_nowhere(self, path: Path, where: str = "") -> None:
         """Raise RecordingError for what lies outside of the recording."""
@@ -221,47 +260,16 @@ class RecordingReader:
         except FileError:
             return  # then it cannot be read either, and is missing
 
-    def _check_size(self, shape: tuple[int, ...], where: str) -> None:
-        if shape != self.intrinsics.shape:
+    def _check_size(self, shape: tuple[int, ...], where: str, right: tuple[int, int] | None = None) -> None:
+        height, width = right or self.intrinsics.shape
+        if shape != (height, width):
             raise RecordingError(
-                f"{where} has {shape[1]}x{shape[0]} pixels, but {layout.CAMERA_FILE} says "
-                f"{self.intrinsics.width}x{self.intrinsics.height}"
+                f"{where} has {shape[1]}x{shape[0]} pixels, but {self._camera_file.name} says {width}x{height}"
             )
-
-    def _pose_at(self, time: float) -> NDArray[np.float64] | None:
-        """X_WC [4, 4] at a moment that has one."""
-        if self.poses is None:
-            return None
-        i, j, share = self.poses.bracket(time, self._stamp_limit) or (0, 0, 0.0)
-        X_WC = layout.pose_from_numbers(self.poses.values[i])
-        if share > 0:
-            p, q = self.poses.values[[i, j], :3], self.poses.values[[i, j], 3:]
-            X_WC[:3, :3] = Slerp([0, 1], Rotation.from_quat(q))(share).as_matrix()
-            X_WC[:3, 3] = (1 - share) * p[0] + share * p[1]
-        return X_WC
-
-    def _position_at(self, time: float) -> NDArray[np.float64] | None:
-        """Joint angles theta_t at a moment that has them, rad."""
-        if self.joints is None:
-            return None
-        i, j, share = self.joints.bracket(time, self._stamp_limit) or (0, 0, 0.0)
-        q = self.joints.values[i]
-        return q + share * (self.joints.values[j] - q) if share > 0 else q
 
     def leave_out(self, color: ListedFile | RecordedFrame, why: str) -> None:
         """Note that a frame was passed over."""
-        self.left_out.append(LeftOut(str(self._color_list), color.line, why))
-
-    def _look_at_scale(self, depth: NDArray[np.float32]) -> None:
-        """Warn of a depth that is unlikely on the whole."""
-        if not (depth > 0).any():
-            return
-        median = float(np.median(depth[depth > 0]))
-        if not LIKELY_DEPTH[0] <= median <= LIKELY_DEPTH[1]:
-            self.warnings.append(
-                f"{self.folder / layout.CAMERA_FILE}: the median depth is {median:.3g} m, which is unlikely; "
-                f'is "depth_scale" (units per metre) right?'
-            )
+        self.left_out.append(LeftOut(str(self._color_list), color.line, why, self._lists.unit))
 
     def _read_color(self, name: str) -> NDArray[np.uint8]:
         image = self._read_image(self.folder / name, jpeg=True)
@@ -270,13 +278,19 @@ class RecordingReader:
         return cv2.cvtColor(image[..., :3], cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
 
     def _read_depth(self, name: str) -> NDArray[np.float32]:
-        image = self._read_image(self.folder / name)
-        if image.dtype != np.uint16 or image.ndim != 2:
-            raise RecordingError(f"{self.folder / name}: depth images have one channel of 16 bits")
+        path = self.folder / name
+        try:
+            image = decode_depth(read_bytes(path, MOST_BYTES, self._inside), str(path))
+        except FileError as error:
+            raise DamagedImageError(str(error)) from None
+        if image.ndim != 2 or image.dtype not in DEPTH_TYPES:
+            raise RecordingError(f"{path}: depth images have one channel of 16 bits, or of floats")
+        self._check_size(image.shape, str(path), self._registration.depth_shape)
         # A product, as depth sensors and Drake make it: a quotient can differ in the last bit.
-        metres_per_unit = np.float32(1 / self._depth_scale)
-        depth = np.where(image == INVALID, 0, image).astype(np.float32) * metres_per_unit
-        return sanitize_depth(depth)
+        metres_per_unit = np.float32(1 / self.depth_scale)
+        if image.dtype == np.uint16:
+            image = np.where(image == INVALID, 0, image)
+        return sanitize_depth(image.astype(np.float32) * metres_per_unit)
 
     def _read_image(self, path: Path, *, jpeg: bool = False) -> NDArray:
         """The image of a file, once its header has promised the camera's size."""
@@ -290,8 +304,9 @@ class RecordingReader:
         return decode(content, str(path), jpeg=jpeg)
 
     def _beside(self, folder: str, color_name: str) -> Path:
-        """The image in another folder that has the name of a colour image."""
-        return self.folder / folder / Path(color_name).name
+        """The image in another folder that has the name of a colour image, or its stem, as of a JPEG."""
+        path = self.folder / folder / Path(color_name).name
+        return path if is_file(path) else path.with_suffix(".png")
 
     def _read_beside(self, folder: str, color_name: str) -> NDArray[np.uint16] | None:
         path = self._beside(folder, color_name)
@@ -300,26 +315,7 @@ class RecordingReader:
         image = self._read_image(path)
         if image.ndim != 2 or image.dtype not in (np.uint8, np.uint16):
             raise RecordingError(f"{path}: masks have one channel of 8 or 16 bits")
-        return image.astype(np.uint16)
-
-
-def _read_camera(path: Path, inside: Path | None) -> tuple[Intrinsics, float]:
-    try:
-        content = json.loads(read_text(path, MOST_SETTINGS, inside))
-    except MissingFileError:
-        raise RecordingError(
-            f"{path} is missing; it holds width, height, fx, fy, cx, cy, depth_scale"
-        ) from None
-    except json.JSONDecodeError as error:
-        raise RecordingError(f"{path}: line {error.lineno} is not JSON ({error.msg})") from None
-    except FileError as error:
-        raise layout.refusal(error) from None
-    except (ValueError, RecursionError):
-        raise RecordingError(f"{path} is no JSON that can be read") from None
-    try:
-        return layout.camera_from_json(content)
-    except RecordingError as error:
-        raise RecordingError(f"{path}: {error}") from None
+        return self._registration.registered_mask(image.astype(np.uint16))
 
 
 def _check_rigid(poses: StampedTable) -> None:

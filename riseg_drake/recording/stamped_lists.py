@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation, Slerp
 
 from riseg_drake.host.files import FileError, read_text
-from riseg_drake.recording.layout import LeftOut, RecordingError, refusal
+from riseg_drake.recording.layout import LeftOut, RecordingError, pose_from_numbers, refusal
 
 FEW = 1 / 20
 """Share of a list that may be out of order, or whose files may be missing, and is left out; where it is
@@ -38,7 +39,7 @@ def read_file_list(path: Path, inside: Path | None = None) -> tuple[list[ListedF
     for what is no such list.
     """
     entries = []
-    for line, cells in _lines(_text(path, inside)):
+    for line, cells in _lines(_text(path, inside), pieces=2):  # names may hold spaces
         if len(cells) != 2:
             raise RecordingError(f"{path}: line {line} must be: timestamp file")
         entries.append(ListedFile(line, _number(cells[0], path, line), cells[1]))
@@ -108,7 +109,31 @@ def read_table(
     return table, left_out
 
 
-def nearest_time(times: NDArray[np.float64], time: float) -> int:
+def pose_between(poses: StampedTable, time: float, limit: float) -> NDArray[np.float64] | None:
+    """The pose [4, 4] that belongs to a moment, s, out of rows tx ty tz qx qy qz qw; None if no row is near."""
+    bracket = poses.bracket(time, limit)
+    if bracket is None:
+        return None
+    i, j, share = bracket
+    X = pose_from_numbers(poses.values[i])
+    if share > 0:
+        p, q = poses.values[[i, j], :3], poses.values[[i, j], 3:]
+        X[:3, :3] = Slerp([0, 1], Rotation.from_quat(q))(share).as_matrix()
+        X[:3, 3] = (1 - share) * p[0] + share * p[1]
+    return X
+
+
+def row_between(table: StampedTable, time: float, limit: float) -> NDArray[np.float64] | None:
+    """The row that belongs to a moment, s, such as joint angles; None if no row is near."""
+    bracket = table.bracket(time, limit)
+    if bracket is None:
+        return None
+    i, j, share = bracket
+    q = table.values[i]
+    return q + share * (table.values[j] - q) if share > 0 else q
+
+
+def nearest_time(times: NDArray, time: float) -> int:
     """Which of N > 0 rising times [N] is the nearest."""
     j = int(np.searchsorted(times, time))
     return min((k for k in (j - 1, j) if 0 <= k < len(times)), key=lambda k: abs(times[k] - time))
@@ -149,12 +174,12 @@ def _heading(text: str, separator: str | None) -> list[str]:
     return []
 
 
-def _lines(text: str, separator: str | None = None) -> Iterator[tuple[int, list[str]]]:
-    """The cells of every line that is neither empty, nor a comment, nor the heading of a table."""
+def _lines(text: str, separator: str | None = None, pieces: int = 0) -> Iterator[tuple[int, list[str]]]:
+    """The cells (at most so many) of every line that is neither empty, nor a comment, nor a table's heading."""
     # Not splitlines(): it knows line ends that text editors, and so people, do not count.
     for number, line in enumerate(text.split("\n"), start=1):
         if line.strip() and not line.startswith(("#", "timestamp")):
-            yield number, line.strip().split(separator)
+            yield number, line.strip().split(separator, pieces - 1)
 
 
 def _number(cell: str, path: Path, line: int) -> float:

@@ -44,8 +44,13 @@ def one_scene(words: list[str]) -> list[str] | None:
     return [*short, "--scenario", str(first_look(given)), "--scenes", "1", "--jobs", "1"]
 
 
-def of_that_robot(words: list[str]) -> list[str]:
-    """`riseg segment` as it stands; where it names a robot, with a recording of that robot."""
+def of_that_robot(words: list[str]) -> list[str] | None:
+    """`riseg segment` as it stands; where it names a robot, with a recording of that robot.
+
+    None for bags, of which there are none.
+    """
+    if words[1].startswith("pushes"):
+        return None
     return [ROBOT_RECORDING if "--robot" in words and word == "my_recording" else word for word in words]
 
 
@@ -71,6 +76,10 @@ EXECUTED: dict[str, tuple[Callable[[list[str]], list[str] | None], str]] = {
         "20 scenes take minutes; tests/app/evaluate/test_evaluate.py has small ones",
     ),
     "segment": (of_that_robot, "executed as it stands"),
+    "convert": (
+        lambda words: None,
+        "needs bags; tests/app/segment/test_convert_command.py writes some",
+    ),
     "score": (lambda words: words, "executed as it stands"),
     "diagram": (lambda words: words, "executed as it stands"),
     "bench": (lambda words: None, "measures for a minute; tests/app/bench/test_stop_bench.py has its parts"),

@@ -26,7 +26,8 @@ from riseg_drake.host.files import MOST_SETTINGS, FileError, check_inside, read_
 from riseg_drake.host.terminal import one_line
 from riseg_drake.recording import layout
 from riseg_drake.recording.layout import LeftOut, RecordedFrame, RecordingError
-from riseg_drake.recording.reader import RecordingReader
+from riseg_drake.recording.source import RecordedSource, SourceOptions
+from riseg_drake.recording.source_kinds import opened_source
 from riseg_drake.segmentation.table_plane import NoPlaneError
 from riseg_drake.segmentation.untouched import untouched_clusters
 from riseg_drake.systems.stage_clock import StageClock
@@ -53,6 +54,12 @@ class SegmentRequest:
     """How far apart in time what belongs together may be, s."""
     follow: bool = False
     """Whether links may lead out of the recording."""
+    rate: float | None = None
+    """Images a second of a folder whose images have numbers for names, Hz."""
+    topics: Mapping[str, str] = field(default_factory=dict)
+    """Topics of a bag, or folders of images, by what they hold."""
+    world_frame: str | None = None
+    """The frame of a bag's transforms in which camera poses are given."""
     overwrite: bool = False
     """Whether an earlier segmentation is removed."""
 
@@ -84,7 +91,15 @@ class SegmentResult:
 
 def segment_command(request: SegmentRequest, console: Console) -> None:
     """Segment a recording into a folder, tell how it goes, and show the scores if there are labels."""
-    reader = RecordingReader(request.recording, request.stamp_limit, follow=request.follow)
+    options = SourceOptions(
+        request.stamp_limit,
+        request.follow,
+        request.rate,
+        request.topics,
+        request.world_frame,
+        robot=request.robot is not None,
+    )
+    reader = opened_source(request.recording, options)
     scenario, seed = _parameters(request)
     view = recorded_view(reader, scenario, request.robot, request.camera_frame)
     about = {
@@ -109,7 +124,7 @@ def segment_command(request: SegmentRequest, console: Console) -> None:
 
 
 def _segment(
-    reader: RecordingReader,
+    reader: RecordedSource,
     view: RecordedView,
     replay: Replay,
     folder: SegmentFolder,
@@ -134,15 +149,13 @@ def _segment(
         told.tell([*result.warnings, *map(str, result.left_out)])
         progress.update(bar, completed=len(reader))
     if result.frames == 0:
-        raise RecordingError(
-            f"{reader.folder}: no frame shows a table top; the first: {result.left_out[-1].why}"
-        )
+        raise RecordingError(f"{reader.path}: no frame shows a table top; the first: {result.left_out[-1].why}")
     folder.write_untouched(untouched_clusters(replay.segmentation))
     folder.finish()
 
 
 def _take(
-    frame: RecordedFrame, reader: RecordingReader, replay: Replay, folder: SegmentFolder, result: SegmentResult
+    frame: RecordedFrame, reader: RecordedSource, replay: Replay, folder: SegmentFolder, result: SegmentResult
 ) -> None:
     try:
         mask = replay.mask_after(frame)
@@ -213,7 +226,7 @@ def _own(request: SegmentRequest, name: str) -> Path | None:
 def _recording_name(folder: Path) -> str:
     """What a recording is called; that of a run by its run."""
     folder = folder.resolve()
-    return folder.parent.name if folder.name == RECORDING else folder.name
+    return folder.parent.name if folder.name == RECORDING else folder.stem if folder.is_file() else folder.name
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from riseg_drake.host.model_files import ModelFileError, reading_model
 from riseg_drake.host.terminal import one_line
 from riseg_drake.recording import layout
 from riseg_drake.recording.layout import RecordingError
-from riseg_drake.recording.reader import RecordingReader
+from riseg_drake.recording.source import RecordedSource
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.robot.own_robot import OwnRobot, OwnRobotError
 from riseg_drake.robot.silhouette import Kinematics, RobotSilhouette, UnknownShapeError
@@ -28,7 +28,7 @@ class RecordedView:
 
 
 def recorded_view(
-    reader: RecordingReader, scenario: Scenario, robot: Path | None, camera_frame: str
+    reader: RecordedSource, scenario: Scenario, robot: Path | None, camera_frame: str
 ) -> RecordedView:
     """The view that fits what a recording holds.
 
@@ -42,11 +42,11 @@ def recorded_view(
     if reader.joints is None:
         if robot is not None:
             raise RecordingError(
-                f"{reader.folder / layout.JOINT_LIST} is missing; --robot says nothing without joint angles"
+                f"{reader.path / layout.JOINT_LIST} is missing; --robot says nothing without joint angles"
             )
         return RecordedView(
             FrameView(reader.intrinsics, None, None),
-            camera_poses=layout.POSE_LIST if reader.poses is not None else "fixed camera",
+            camera_poses=reader.camera_poses or "fixed camera",
             robot_pixels=f"{layout.ROBOT_FOLDER}/" if masks else "none",
             warnings=[],
         )
@@ -54,20 +54,20 @@ def recorded_view(
     kinematics = _kinematics(reader, number, scenario, robot, camera_frame)
     warnings = []
     try:
-        robot_mask, source = RobotSilhouette(kinematics, reader.intrinsics).mask, layout.JOINT_LIST
+        robot_mask, source = RobotSilhouette(kinematics, reader.intrinsics).mask, reader.joints.path.name
     except UnknownShapeError as error:
         robot_mask, source = None, f"{layout.ROBOT_FOLDER}/" if masks else "none"
         warnings.append(f"{robot}: {error}; robot masks: {source}")
     return RecordedView(
         FrameView(reader.intrinsics, kinematics.X_WC, robot_mask, number),
-        camera_poses=layout.JOINT_LIST,
+        camera_poses=reader.joints.path.name,
         robot_pixels=source,
         warnings=warnings,
     )
 
 
 def _kinematics(
-    reader: RecordingReader, number: int, scenario: Scenario, robot: Path | None, camera_frame: str
+    reader: RecordedSource, number: int, scenario: Scenario, robot: Path | None, camera_frame: str
 ) -> Kinematics:
     assert reader.joints is not None
     if robot is not None:

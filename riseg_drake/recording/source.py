@@ -1,0 +1,94 @@
+"""What every source of recorded frames has in common, whatever it was written by."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.recording.layout import LeftOut, RecordedFrame
+from riseg_drake.recording.stamped_lists import StampedTable
+
+STAMP_LIMIT = 0.02
+"""How far the stamps of what belongs together may lie apart, s; the TUM tools' own value."""
+LIKELY_DEPTH = (0.1, 10.0)
+"""m; a median depth outside most often means a wrong depth_scale."""
+
+
+@dataclass(frozen=True)
+class SourceOptions:
+    """What a person may say of a recording that it does not say itself."""
+
+    stamp_limit: float = STAMP_LIMIT
+    """How far apart in time what belongs together may be, s."""
+    follow: bool = False
+    """Whether links may lead out of a folder."""
+    rate: float | None = None
+    """Images a second of a folder whose images have numbers for names, Hz."""
+    topics: Mapping[str, str] = field(default_factory=dict)
+    """Topics of a bag, or folders of a folder, by what they hold: color, depth and so on."""
+    world_frame: str | None = None
+    """The frame of a bag's transforms in which camera poses are given; the topmost if None."""
+    robot: bool = False
+    """Whether a robot is named that the joint angles of a bag belong to."""
+
+
+class RecordedSource(ABC):
+    """Frames of a recording, one after the other; only what is small is held in memory.
+
+    What cannot be used is left out and noted in `left_out`, what is possible but odd in `warnings`; both may
+    grow while frames are read.
+    """
+
+    path: Path
+    """What was opened."""
+    intrinsics: Intrinsics
+    """Of the frames that come out."""
+    depth_scale: float
+    """Units of depth in a metre, as the source keeps them."""
+    camera_poses: str | None
+    """What the camera's poses are from; None if it stands still."""
+    joints: StampedTable | None
+    """The joint angles, None without any."""
+    left_out: list[LeftOut]
+    warnings: list[str]
+
+    @abstractmethod
+    def __len__(self) -> int:
+        """How many frames there are to read; those that turn out to be damaged are among them."""
+
+    @abstractmethod
+    def __iter__(self) -> Iterator[RecordedFrame]:
+        """Read from the beginning."""
+
+    @abstractmethod
+    def leave_out(self, frame: RecordedFrame, why: str) -> None:
+        """Note that a frame was passed over."""
+
+    @abstractmethod
+    def times(self) -> list[float]:
+        """Of all frames, s."""
+
+    @property
+    def rate(self) -> float:
+        """Frames a second, by the median; 1 for a single frame."""
+        times = self.times()
+        return float(1 / np.median(np.diff(times))) if len(times) > 1 else 1.0
+
+    def holds_images(self, folder: str) -> bool:
+        """Whether `robot` or `label` is there and holds something."""
+        return False
+
+    def _look_at_scale(self, depth: NDArray[np.float32], file: Path | str) -> None:
+        """Warn of a depth [H, W], m, that is unlikely on the whole; `file` says what it is measured in."""
+        if not (depth > 0).any():
+            return
+        median = float(np.median(depth[depth > 0]))
+        if not LIKELY_DEPTH[0] <= median <= LIKELY_DEPTH[1]:
+            self.warnings.append(
+                f"{file}: the median depth is {median:.3g} m, which is unlikely; "
+                f'is "depth_scale" (units per metre) right?'
+            )
