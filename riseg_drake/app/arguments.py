@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from riseg_drake.app import commands
-from riseg_drake.export.formats import FORMATS
+from riseg_drake.app.export_options import add_export
 
 BAD_INPUT = 2
 """Exit code."""
@@ -43,7 +43,7 @@ def command_line() -> argparse.ArgumentParser:
         default=False,
         help="show it in the browser and save the replay as DIR/replay.html (no)",
     )
-    _add_export(run)
+    add_export(run)
 
     evaluate = _add(
         subparsers,
@@ -124,7 +124,7 @@ def command_line() -> argparse.ArgumentParser:
         action="store_true",
         help="hear a log that lcm-logplayer plays: old time stamps count as new, nothing is moved",
     )
-    _add_export(hardware)
+    add_export(hardware)
 
     hand_eye = _add(
         subparsers,
@@ -212,7 +212,7 @@ def command_line() -> argparse.ArgumentParser:
     segment.add_argument(
         "--follow", action="store_true", help="follow links and paths that lead out of the recording (no)"
     )
-    _add_export(segment)
+    add_export(segment)
 
     score = _add(
         subparsers,
@@ -314,39 +314,6 @@ def _seconds(text: str) -> float:
     if not 0 < seconds < 1e6:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds above 0")
     return seconds
-
-
-def _formats(text: str) -> tuple[str, ...]:
-    names = tuple(dict.fromkeys(filter(None, (name.strip() for name in text.split(",")))))
-    unknown = [name for name in names if name not in FORMATS]
-    if unknown or not names:
-        what = f"{unknown[0][:30]!r} is no format" if unknown else "no format is named"
-        raise argparse.ArgumentTypeError(f"{what}; the formats are {', '.join(FORMATS)}")
-    return names
-
-
-def _frame_numbers(text: str) -> tuple[int, ...]:
-    words = text.split(",")
-    if not all(word.isdecimal() and len(word) < 10 for word in words):
-        raise argparse.ArgumentTypeError(f"{text[:30]!r} is no list of frame numbers, such as 0,30,60")
-    return tuple(map(int, words))
-
-
-def _add_export(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--export",
-        type=_formats,
-        default=(),
-        metavar="FORMATS",
-        help=f"also write the masks for other tools, to DIR/export; any of {','.join(FORMATS)} (none)",
-    )
-    command.add_argument(
-        "--export-frames",
-        type=_frame_numbers,
-        default=(),
-        metavar="NUMBERS",
-        help="frames that contact_graspnet gets, counted from 0, such as 0,30 (the last one)",
-    )
 
 
 def _add_overwrite(command: argparse.ArgumentParser, earlier: str) -> None:

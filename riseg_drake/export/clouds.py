@@ -37,6 +37,7 @@ class VoxelCloud:
     """Means of points and colours in voxels; memory grows with the surface, not with the number of frames."""
 
     voxel: float
+    """Edge, m."""
     key: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 3), np.int64))
     """[N, 3], rising, each once."""
     sum: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 7)))
