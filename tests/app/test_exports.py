@@ -8,6 +8,7 @@ from pycocotools.coco import COCO
 from scipy.spatial.transform import Rotation
 
 from riseg_drake.app.cli import main
+from riseg_drake.app.exports import Exports, exporting
 from riseg_drake.export.formats import FORMATS
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.se3 import inverse, move_points, translation
@@ -122,3 +123,17 @@ def test_what_cannot_be_exported_is_one_line_before_anything_is_written(film, tm
     assert said in " ".join(error.split())
     assert error.count("\n") == 1
     assert not output.exists()
+
+
+def test_what_is_stopped_leaves_whole_files_of_what_was_seen(tmp_path):
+    noted = []
+    with pytest.raises(KeyboardInterrupt), exporting(Exports(tmp_path, ("coco", "clouds")), noted.append):
+        raise KeyboardInterrupt
+    assert json.loads((tmp_path / "export/coco/annotations.json").read_text())["images"] == []
+    assert noted == []
+
+
+def test_nothing_is_written_unless_it_is_asked_for(tmp_path):
+    with exporting(Exports(tmp_path), pytest.fail):
+        pass
+    assert list(tmp_path.iterdir()) == []
