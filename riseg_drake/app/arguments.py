@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from riseg_drake.app import commands
+from riseg_drake.app.export_options import add_export
 from riseg_drake.app.source_options import add_source_options
 
 BAD_INPUT = 2
@@ -43,6 +44,7 @@ def command_line() -> argparse.ArgumentParser:
         default=False,
         help="show it in the browser and save the replay as DIR/replay.html (no)",
     )
+    add_export(run)
 
     evaluate = _add(
         subparsers,
@@ -123,6 +125,7 @@ def command_line() -> argparse.ArgumentParser:
         action="store_true",
         help="hear a log that lcm-logplayer plays: old time stamps count as new, nothing is moved",
     )
+    add_export(hardware)
 
     hand_eye = _add(
         subparsers,
@@ -200,6 +203,7 @@ def command_line() -> argparse.ArgumentParser:
         help="frame of that robot: x right, y down, z ahead in the image (camera)",
     )
     _add_source(segment)
+    add_export(segment)
 
     convert = _add(
         subparsers,

@@ -76,6 +76,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.app.work_state import RunStoppedError
     from riseg_drake.evaluation.label_folders import LabelFolderError
     from riseg_drake.evaluation.true_things import ThingsError
+    from riseg_drake.export.export_error import ExportError
     from riseg_drake.learned.model_error import ModelError
     from riseg_drake.recording.layout import RecordingError
     from riseg_drake.robot.own_robot import OwnRobotError
@@ -108,4 +109,5 @@ def _mistakes() -> tuple[type[Exception], ...]:
         TravelError,
         WordError,
         ModelError,
+        ExportError,
     )

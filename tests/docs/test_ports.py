@@ -25,6 +25,7 @@ from riseg_drake.systems.frame_pair import FramePairMemory
 from riseg_drake.systems.frame_view import FrameView
 from riseg_drake.systems.mask_propagator import MaskPropagator
 from riseg_drake.systems.mask_refiner import MaskRefiner
+from riseg_drake.systems.object_clouds import ObjectClouds
 from riseg_drake.systems.objects_above_table import ObjectsAboveTable
 from riseg_drake.systems.optical_flow import OpticalFlow
 from riseg_drake.systems.push_planner import PushPlanner
@@ -43,6 +44,7 @@ MAKE = {
     OpticalFlow: OpticalFlow,
     BFIFGrouper: BFIFGrouper,
     MaskPropagator: lambda: MaskPropagator(SMALL, 0.1, 0.001),
+    ObjectClouds: lambda: ObjectClouds(SMALL),
     MaskRefiner: lambda: MaskRefiner(lambda frame, mask: mask, 0.1, 0.001),
     PushPlanner: lambda: PushPlanner(PandaKinematics()),
     ArmMotion: lambda: ArmMotion(READY),

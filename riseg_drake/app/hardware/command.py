@@ -13,6 +13,7 @@ from pydrake.trajectories import PiecewisePolynomial
 from rich.console import Console
 
 from riseg_drake.app.diagram import Drivers, WiredDiagram, make_diagram
+from riseg_drake.app.exports import Exports, exporting
 from riseg_drake.app.hardware.arm_travel import ARRIVED, WayBack, straight_motion, travel
 from riseg_drake.app.hardware.arm_watch import ArmWatch
 from riseg_drake.app.hardware.drivers import PATIENCE, listening, wait_for_drivers
@@ -20,7 +21,7 @@ from riseg_drake.app.hardware.dry_run import DryRun
 from riseg_drake.app.hardware.terminal_operator import TerminalOperator
 from riseg_drake.app.output import RECORDING, RunFolder, Step
 from riseg_drake.app.planned_speed import check_limits, planned_limits
-from riseg_drake.app.run.command import Narrator, report, state_of
+from riseg_drake.app.run.command import Narrator, export_listener, report, state_of
 from riseg_drake.app.run.interactions import Listener, Progress, TruthSource, WallClock, interactions
 from riseg_drake.app.run.recording import recording_of
 from riseg_drake.app.scenario import HARDWARE, Scenario, load_scenario, scenario_name
@@ -59,6 +60,10 @@ class HardwareRequest:
     """Whether the emulator's true labels are heard."""
     replayed: bool = False
     """Whether a log is heard in place of drivers; then nothing moves."""
+    export: tuple[str, ...] = ()
+    """Formats of other tools."""
+    export_frames: tuple[int, ...] = ()
+    """Numbers of the frames for Contact-GraspNet, from 0; the last one if there are none."""
 
 
 def hardware_command(request: HardwareRequest, console: Console) -> None:
@@ -71,8 +76,10 @@ def hardware_command(request: HardwareRequest, console: Console) -> None:
         console.print(warning, style="yellow")
     name = scenario_name(request.scenario, HARDWARE)
     seed, dry_run = request.seed, request.dry_run or request.replayed
+    output = request.output or Path("out") / f"{name}_{time.strftime('%Y%m%d_%H%M%S')}"
+    exports = Exports(output, request.export, request.export_frames)
     folder = RunFolder(
-        request.output or Path("out") / f"{name}_{time.strftime('%Y%m%d_%H%M%S')}",
+        output,
         {"scenario": name, "seed": seed, "dry_run": dry_run},
         command="hardware",
     )
@@ -82,6 +89,7 @@ def hardware_command(request: HardwareRequest, console: Console) -> None:
         try:
             with (
                 state_of(folder, progress, steps),
+                exporting(exports, folder.note),
                 listening(config, request.replayed, request.truth) as (reception, truth_source),
             ):
                 console.print(f"{name}, results in {folder.path}")
@@ -90,7 +98,17 @@ def hardware_command(request: HardwareRequest, console: Console) -> None:
                     wait_for_drivers(reception, config, ready=not dry_run, say=status.update)
                 operator = TerminalOperator(console, request.yes)
                 session = _Session(
-                    scenario, seed, folder, progress, steps, reception, truth_source, operator, console, browser
+                    scenario,
+                    seed,
+                    folder,
+                    progress,
+                    steps,
+                    reception,
+                    truth_source,
+                    operator,
+                    console,
+                    browser,
+                    exports,
                 )
                 if dry_run:
                     session.run_dry(request.yes, request.replayed)
@@ -98,8 +116,10 @@ def hardware_command(request: HardwareRequest, console: Console) -> None:
                     session.run(request.record)
         except RunStoppedError:
             report(steps, console)
+            exports.tell(console)
             raise
     report(steps, console)
+    exports.tell(console)
 
 
 class _Session:
@@ -117,10 +137,11 @@ class _Session:
         operator: TerminalOperator,
         console: Console,
         meshcat: Meshcat | None,
+        exports: Exports,
     ):
         self._scenario, self._seed, self._folder = scenario, seed, folder
         self._reception, self._truth, self._operator = reception, truth, operator
-        self._console, self._meshcat = console, meshcat
+        self._console, self._meshcat, self._exports = console, meshcat, exports
         self._config = scenario.hardware
         self._progress, self._steps = progress, steps
         self._heard = (0, time.monotonic())
@@ -198,7 +219,11 @@ class _Session:
     ) -> None:
         with self._console.status("looking") as status:
             narrator = Narrator(self._console, status)
-            listeners = [lambda *_: narrator.follow(self._progress), *listeners]
+            listeners = [
+                lambda *_: narrator.follow(self._progress),
+                *listeners,
+                export_listener(wired, self._exports),
+            ]
             wall = WallClock(self._reception.clock(), lambda context: self._look(look, context))
             for step in interactions(
                 wired,

@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.status import Status
 
 from riseg_drake.app.diagram import WiredDiagram, make_diagram
+from riseg_drake.app.exports import Exports, exporting
 from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step, stage_figures
 from riseg_drake.app.run.interactions import Listener, Progress, interactions, simulated_truth
@@ -45,6 +46,10 @@ class RunRequest:
     """Whether it is shown in a browser."""
     overwrite: bool = False
     """Whether an earlier run there is removed first."""
+    export: tuple[str, ...] = ()
+    """Formats of other tools."""
+    export_frames: tuple[int, ...] = ()
+    """Numbers of the frames for Contact-GraspNet, from 0; the last one if there are none."""
 
 
 def run_command(request: RunRequest, console: Console) -> None:
@@ -54,12 +59,14 @@ def run_command(request: RunRequest, console: Console) -> None:
     require_graphics()
     name = scenario_name(request.scenario)
     path, about = request.output or Path("out") / f"{name}_seed_{seed}", {"scenario": name, "seed": seed}
+    exports = Exports(path, request.export, request.export_frames)
     with RunFolder(path, about, overwrite=request.overwrite) as folder:
         console.print(f"{name}, seed {seed}, results in {folder.path}")
         browser = StartMeshcat() if request.meshcat else None
         with console.status("placing the objects") as status:
-            steps = run(scenario, seed, folder, request.record, browser, Narrator(console, status))
+            steps = run(scenario, seed, folder, request.record, browser, Narrator(console, status), exports)
     report(steps, console)
+    exports.tell(console)
 
 
 def run(
@@ -69,6 +76,7 @@ def run(
     record: bool = False,
     meshcat: Meshcat | None = None,
     narrator: "Narrator | None" = None,
+    exports: Exports | None = None,
 ) -> list[Step]:
     """Run one scene into a folder; returns its steps. However it stops, what it leaves is whole."""
     narrator = narrator or Narrator()
@@ -83,6 +91,8 @@ def run(
         if record:
             recording = recording_of(wired, scenario, seed, simulated_truth(wired), folder.path / RECORDING)
             listeners.append(stack.enter_context(recording))
+        if exports is not None:
+            listeners.append(export_listener(wired, stack.enter_context(exporting(exports, folder.note))))
         if meshcat is not None:
             stack.enter_context(_replay(meshcat, folder.path / REPLAY))
         for step in interactions(wired, StageClock(), progress, scenario.longest, tuple(listeners)):
@@ -93,6 +103,11 @@ def run(
             refined.finish()
     narrator.tell_end(progress)
     return steps
+
+
+def export_listener(wired: WiredDiagram, exports: Exports) -> Listener:
+    """What exports the mask of every frame."""
+    return lambda _, context: exports.take(wired.segmentation(context))
 
 
 def ending_figures(progress: Progress) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from riseg_drake.app.exports import Exports, exporting
 from riseg_drake.app.output import RECORDING, confidence_figures, stage_figures
 from riseg_drake.app.run.command import peak_memory_mb
 from riseg_drake.app.scenario import Scenario, load_scenario
@@ -62,6 +63,10 @@ class SegmentRequest:
     """The frame of a bag's transforms in which camera poses are given."""
     overwrite: bool = False
     """Whether an earlier segmentation is removed."""
+    export: tuple[str, ...] = ()
+    """Formats of other tools."""
+    export_frames: tuple[int, ...] = ()
+    """Numbers of the frames for Contact-GraspNet, from 0; the last one if there are none."""
 
 
 @dataclass
@@ -112,15 +117,18 @@ def segment_command(request: SegmentRequest, console: Console) -> None:
         "seed": seed,
     }
     output = request.output or Path("out") / f"segment_{_recording_name(request.recording)}"
+    exports = Exports(output, request.export, request.export_frames)
     clock, result = StageClock(), SegmentResult()
     with (
         SegmentFolder(output, reader.rate, about, overwrite=request.overwrite) as folder,
         _state_of(folder, result, clock),
+        exporting(exports, folder.note),
     ):
         console.print(f"{len(reader)} frames of {request.recording}, results in {output}", highlight=False)
         console.print(f"camera poses: {view.camera_poses}; robot pixels: {view.robot_pixels}", highlight=False)
-        _segment(reader, view, Replay(scenario, view.view, seed), folder, clock, result, console)
+        _segment(reader, view, Replay(scenario, view.view, seed), folder, exports, clock, result, console)
     _report(result, clock, output, console)
+    exports.tell(console)
 
 
 def _segment(
@@ -128,6 +136,7 @@ def _segment(
     view: RecordedView,
     replay: Replay,
     folder: SegmentFolder,
+    exports: Exports,
     clock: StageClock,
     result: SegmentResult,
     console: Console,
@@ -140,7 +149,8 @@ def _segment(
     ) as progress:
         bar = progress.add_task("frames", total=len(reader))
         for frame in reader:
-            _take(frame, reader, replay, folder, result)
+            if _take(frame, reader, replay, folder, result):
+                exports.take(replay.segmentation, frame.name)
             result.left_out, result.warnings = reader.left_out, [*view.warnings, *reader.warnings]
             told.tell([*result.warnings, *map(str, result.left_out)])
             for times in clock.seconds.values():
@@ -156,12 +166,13 @@ def _segment(
 
 def _take(
     frame: RecordedFrame, reader: RecordedSource, replay: Replay, folder: SegmentFolder, result: SegmentResult
-) -> None:
+) -> bool:
+    """Whether the frame could be taken in."""
     try:
         mask = replay.mask_after(frame)
     except NoPlaneError as error:
         reader.leave_out(frame, str(error))
-        return
+        return False
     scores = None
     if frame.labels is not None:
         scores = result.last = score(mask, frame.labels)
@@ -171,6 +182,7 @@ def _take(
     folder.write(frame.name, frame.color, mask, segmentation.confidence, scores)
     result.frames += 1
     result.object_ids, result.confidence = segmentation.object_ids, segmentation.confidence
+    return True
 
 
 class _Told:

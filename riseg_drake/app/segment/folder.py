@@ -5,6 +5,7 @@
     untouched.png           of the last frame what has not moved yet, as clusters of depth: guessed, and no ids
     overlay.mp4             every frame with its objects tinted and numbered
     scores.csv              the ten figures of every frame with a true label
+    export/                 the same in the formats of other tools, where that was asked for
 
 Whenever it is stopped, the masks that are there are whole, and the summary says how many they are.
 """
@@ -22,6 +23,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.app.exports import EXPORT
 from riseg_drake.app.output_folder import OutputError, OutputFolder
 from riseg_drake.evaluation.scores import Scores
 from riseg_drake.host.processes import undisturbed
@@ -36,7 +38,7 @@ COMMAND = "segment"
 LONGEST_NAME = 50
 """Characters of a mask's name: as many bytes as any file system takes, whatever they are."""
 _UNFINISHED_VIDEO = ".overlay.unfinished.mp4"  # OpenCV goes by the ending
-PARTS = "|".join(map(re.escape, (MASKS, UNTOUCHED, VIDEO, SCORES, _UNFINISHED_VIDEO)))
+PARTS = "|".join(map(re.escape, (MASKS, UNTOUCHED, VIDEO, SCORES, EXPORT, _UNFINISHED_VIDEO)))
 """What a segmentation puts into its folder, beside the summary."""
 
 

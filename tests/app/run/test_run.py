@@ -21,7 +21,8 @@ STAGES = ("FrameView", "ObjectsAboveTable", "ExpectedFlow", "OpticalFlow", "BFIF
 @pytest.fixture(scope="module")
 def finished(small_scenario, tmp_path_factory):
     folder = tmp_path_factory.mktemp("finished")
-    assert main(["run", str(small_scenario), "--seed", "1", "--record", "--output", str(folder)]) == 0
+    words = ["--seed", "1", "--record", "--export", "contact_graspnet,motions", "--output", str(folder)]
+    assert main(["run", str(small_scenario), *words]) == 0
     return folder
 
 
@@ -73,6 +74,18 @@ def test_the_area_that_is_left_at_the_end_is_that_of_what_is_not_segmented(finis
     # What has never moved, and what is in doubt, each in whole numbers.
     told = sum(map(int, re.findall(r"(\d+) cm\^2", content["end"])))
     assert told == pytest.approx(1e4 * content["unsettled_area_m2"], abs=1)
+
+
+def test_the_frame_that_is_exported_is_the_last_one_that_was_recorded_with_its_mask(finished):
+    (file,) = (finished / "export" / "contact_graspnet").iterdir()
+    last = sorted((finished / "recording" / "rgb").iterdir())[-1]
+    assert file.stem == last.stem
+    with np.load(file) as data:
+        np.testing.assert_array_equal(data["rgb"], read(last))
+        np.testing.assert_array_equal(data["segmap"], read(finished / "step_1" / "mask.png"))
+    ids = np.unique(read(finished / "step_1" / "mask.png")).tolist()[1:]
+    assert {f"object_{a}.txt" for a in ids} == {p.name for p in (finished / "export" / "motions").iterdir()}
+    assert summary(finished)["exports"] == ["contact_graspnet", "motions"]
 
 
 def test_before_the_first_push_the_mask_is_empty(finished):
