@@ -209,6 +209,11 @@ def command_line() -> argparse.ArgumentParser:
     segment.add_argument(
         "--follow", action="store_true", help="follow links and paths that lead out of the recording (no)"
     )
+    segment.add_argument(
+        "--strict",
+        action="store_true",
+        help="refuse a recording that can hardly be right (it is said, and read)",
+    )
 
     score = _add(
         subparsers,

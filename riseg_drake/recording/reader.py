@@ -63,7 +63,7 @@ class RecordingReader:
         """What was passed over so far, in the order in which it was found."""
         self.warnings: list[str] = []
         """What is possible, but odd."""
-        self.intrinsics, self._depth_scale = _read_camera(folder / layout.CAMERA_FILE, self._inside)
+        self.intrinsics, self.depth_scale = _read_camera(folder / layout.CAMERA_FILE, self._inside)
         camera_file = folder / layout.CAMERA_FILE
         self.warnings += [f"{camera_file}: {odd}" for odd in layout.unlikely_camera(self.intrinsics)]
         self._stamp_limit = stamp_limit
@@ -96,6 +96,22 @@ class RecordingReader:
             raise RecordingError(f"{path} is no folder of images; make it one or take it away")
         self._check_leads_nowhere(path)
         return any(path.iterdir())
+
+    @property
+    def names(self) -> list[tuple[str, str]]:
+        """Of each frame the colour and the depth image, as the lists have them."""
+        return [(color.name, depth.name) for color, depth in self._frames]
+
+    def images_beside(self, folder: str) -> int:
+        """How many frames have an image of their own in `robot` or `label`."""
+        return sum(is_file(self._beside(folder, color)) for color, _ in self.names)
+
+    def frame(self, number: int) -> RecordedFrame | None:
+        """One of the frames, from 0; None where it is damaged, which is noted when its turn comes."""
+        try:
+            return self._read(*self._frames[number])
+        except DamagedImageError:
+            return None
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         first_damage = ""
@@ -274,7 +290,7 @@ class RecordingReader:
         if image.dtype != np.uint16 or image.ndim != 2:
             raise RecordingError(f"{self.folder / name}: depth images have one channel of 16 bits")
         # A product, as depth sensors and Drake make it: a quotient can differ in the last bit.
-        metres_per_unit = np.float32(1 / self._depth_scale)
+        metres_per_unit = np.float32(1 / self.depth_scale)
         depth = np.where(image == INVALID, 0, image).astype(np.float32) * metres_per_unit
         return sanitize_depth(depth)
 

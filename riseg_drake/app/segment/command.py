@@ -16,6 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from riseg_drake.app.output import RECORDING, confidence_figures, stage_figures
 from riseg_drake.app.run.command import peak_memory_mb
 from riseg_drake.app.scenario import Scenario, load_scenario
+from riseg_drake.app.segment.doubts import frames_with, recording_doubts
 from riseg_drake.app.segment.folder import SegmentFolder
 from riseg_drake.app.segment.recorded_view import RecordedView, recorded_view
 from riseg_drake.app.segment.replay import Replay
@@ -55,6 +56,8 @@ class SegmentRequest:
     """Whether links may lead out of the recording."""
     overwrite: bool = False
     """Whether an earlier segmentation is removed."""
+    strict: bool = False
+    """Whether what can hardly be is an error, and not a warning."""
 
 
 @dataclass
@@ -87,6 +90,11 @@ def segment_command(request: SegmentRequest, console: Console) -> None:
     reader = RecordingReader(request.recording, request.stamp_limit, follow=request.follow)
     scenario, seed = _parameters(request)
     view = recorded_view(reader, scenario, request.robot, request.camera_frame)
+    doubts = recording_doubts(reader, view)
+    if request.strict and (odd := [*reader.warnings, *doubts]):
+        raise RecordingError("; ".join(odd))
+    view.warnings.extend(doubts)
+    having = frames_with(reader)
     about = {
         "recording": str(request.recording),
         "width": reader.intrinsics.width,
@@ -94,6 +102,7 @@ def segment_command(request: SegmentRequest, console: Console) -> None:
         "rate_hz": round(reader.rate, 3),
         "camera_poses": view.camera_poses,
         "robot_pixels": view.robot_pixels,
+        "frames_with": having,
         "seed": seed,
     }
     output = request.output or Path("out") / f"segment_{_recording_name(request.recording)}"
@@ -104,6 +113,9 @@ def segment_command(request: SegmentRequest, console: Console) -> None:
     ):
         console.print(f"{len(reader)} frames of {request.recording}, results in {output}", highlight=False)
         console.print(f"camera poses: {view.camera_poses}; robot pixels: {view.robot_pixels}", highlight=False)
+        console.print(
+            "frames with " + ", ".join(f"{name}: {number}" for name, number in having.items()), highlight=False
+        )
         _segment(reader, view, Replay(scenario, view.view, seed), folder, clock, result, console)
     _report(result, clock, output, console)
 
@@ -120,6 +132,7 @@ def _segment(
     """Put every frame through Alg. 2 and write what comes of it."""
     clock.watch(replay.stages)
     told = _Told(console)
+    told.tell(view.warnings)
     with Progress(
         TextColumn("frames"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console
     ) as progress:
