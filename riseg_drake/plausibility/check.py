@@ -58,7 +58,7 @@ def doubts(
     return [
         *([] if depth_scale is None else doubts_about_scale(views, depth_scale, limits)),
         *doubts_about_registration(frames, pixels, limits),
-        *doubts_about_poses(pairs, poses, limits),
+        *doubts_about_poses(pairs, poses, limits, pixels),
         *doubts_about_jumps([(a, b) for a, b in near if a and b], limits),
         *doubts_about_content(views, limits),
     ]

@@ -27,10 +27,10 @@ class PlausibilityLimits:
     shift: float = 3.5
     """Pixels by which depth may lie off colour: shadows beside steps are as wide in stereo cameras."""
     shift_gain: float = 1.1
-    """How much better edges must agree at another shift than where they lie; on 23 right recordings it is at
-    most 1.01, at 8 pixels 1.2 to 1.8 in all but one of low quality (1.01 to 1.12)."""
+    """How much better edges must agree at another shift than where they lie. On 23 right recordings it is
+    1.01 at most; at 8 pixels 1.2 to 1.8, but 1.01 to 1.12 on a real one whose depth is of low quality."""
     jump: float = 0.1
-    """Share of the image's width that things may move by between two frames: optical flow follows no further."""
+    """Share of the image's width that things may move by between two frames: flow follows no further."""
     filled: float = 0.5
     """Share of the image that one thing may take; the table is what the rest of it shows."""
     hollow: float = 0.5

@@ -120,13 +120,16 @@ def seen_pair(first: View, second: View) -> SeenPair | None:
     return SeenPair(first, second, flow, used) if used.sum() >= _FEWEST else None
 
 
-def doubts_about_poses(pairs: Sequence[SeenPair], source: str | None, limits: PlausibilityLimits) -> list[str]:
+def doubts_about_poses(
+    pairs: Sequence[SeenPair], source: str | None, limits: PlausibilityLimits, pixels: float = 1.0
+) -> list[str]:
     """What is wrong with the poses of pairs of views that lie a few frames apart, in one line or none.
 
     Args:
         pairs: with the poses in their frames.
         source: where the poses come from; None for a camera of which it is said that it stands still.
         limits: from where on that is doubted.
+        pixels: one pixel of the views is so many of the images.
     """
     contradicting, stuck, asked = [], [], 0
     for pair in pairs:
@@ -145,26 +148,28 @@ def doubts_about_poses(pairs: Sequence[SeenPair], source: str | None, limits: Pl
     seen = float(np.median([pair.seen for pair in contradicting]))
     if source is None:
         return [
-            f"the camera moves: the table by {seen:.1f} px within a few frames, where it is said to be fixed; "
+            f"the camera moves: the table by {pixels * seen:.1f} px within a few frames, where it is said to be fixed; "
             "give its poses (groundtruth.txt or joints.csv)"
         ]
     left = float(np.median([pair.left(_motion(pair)) for pair in contradicting]))
-    what = f"{source}: by these poses the table does not stand still: in {len(contradicting)} of {asked} pairs "
-    what += f"of frames they miss the flow of {seen:.1f} px by {_much(left)}"
+    what = (
+        f"{source}: by these poses the table does not stand still: in {len(contradicting)} of {asked} pairs of "
+        f"frames they miss the flow of {pixels * seen:.1f} px by {_much(left, pixels)}"
+    )
     if np.mean(stuck) > 0.5:
         return [f"{what}; they do not change while the camera moves"]
-    return [f"{what}; {_reason(contradicting, left, limits)}"]
+    return [f"{what}; {_reason(contradicting, left, limits, pixels)}"]
 
 
 def _motion(pair: SeenPair) -> NDArray[np.float64]:
     return inverse(pair.second.frame.X_WC) @ pair.first.frame.X_WC
 
 
-def _much(pixels: float) -> str:
-    return f"{pixels:.1f} px" if pixels < _LOST else f"more than {_LOST:.0f} px"
+def _much(left: float, pixels: float) -> str:
+    return f"{pixels * left:.1f} px" if left < _LOST else f"more than {pixels * _LOST:.0f} px"
 
 
-def _reason(pairs: Sequence[SeenPair], left: float, limits: PlausibilityLimits) -> str:
+def _reason(pairs: Sequence[SeenPair], left: float, limits: PlausibilityLimits, pixels: float) -> str:
     """The reading that explains the images; otherwise what there is to look at."""
 
     def under(reading: Motion) -> float:
@@ -177,5 +182,5 @@ def _reason(pairs: Sequence[SeenPair], left: float, limits: PlausibilityLimits) 
         tried[words] = float(np.median([pair.left(_motion(pair), zoom) for pair in pairs]))
     best = min(tried, key=lambda words: tried[words])
     if tried[best] < limits.explained * left:
-        return f"{best} ({tried[best]:.1f} px)"
+        return f"{best} ({pixels * tried[best]:.1f} px)"
     return "are they of the colour camera (x right, y down, z ahead), in metres, of the images' moments?"

@@ -53,8 +53,9 @@ def doubts_about_registration(frames: Sequence[Frame], pixels: float, limits: Pl
         return []
     u, v = pixels * float(du[i, j]), pixels * float(dv[i, j])
     return [
-        f"depth lies beside colour: its edges agree better with those of colour if it is shifted "
-        f"by ({u:+.0f}, {v:+.0f}) pixels (right, down), {best:.2f} against {here:.2f}; depth must be aligned to colour"
+        "depth lies beside colour: its edges agree better with those of colour if it is shifted "
+        f"by ({u:+.0f}, {v:+.0f}) pixels (right, down), {best:.2f} against {here:.2f}; depth must "
+        "be aligned to colour"
     ]
 
 

@@ -16,6 +16,9 @@ FEW = 1 / 20
 """Share of a list that may be out of order, or whose files may be missing, and is left out; where it is
 more, the list is not what it says."""
 
+_COUNTED = (1.1e15, 4e18)
+"""Microseconds since 1970 as of 2004, and nanoseconds as of 2096; no number of seconds, metres or radians."""
+
 _GAP = 5.0
 """Between two rows of a table further apart than so many stamp limits nothing is interpolated."""
 
@@ -162,6 +165,12 @@ def _number(cell: str, path: Path, line: int) -> float:
         value = float(cell)
     except ValueError:
         value = np.nan
+    if _COUNTED[0] < value < _COUNTED[1]:
+        unit, times = ("microseconds", "1e6") if value < 1e17 else ("nanoseconds", "1e9")
+        raise RecordingError(
+            f"{path}: line {line} holds {cell}, which looks like {unit} since 1970; stamps are seconds: "
+            f"divide by {times}"
+        )
     # What is no number of seconds, metres or radians would overflow later on.
     if not abs(value) < 1e15:
         raise RecordingError(f"{path}: line {line} holds {cell!r} where a number should be")
