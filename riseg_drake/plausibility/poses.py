@@ -148,8 +148,8 @@ def doubts_about_poses(
     seen = float(np.median([pair.seen for pair in contradicting]))
     if source is None:
         return [
-            f"the camera moves: the table by {pixels * seen:.1f} px within a few frames, where it is said to be fixed; "
-            "give its poses (groundtruth.txt or joints.csv)"
+            f"the camera moves: the table by {pixels * seen:.1f} px within a few frames, where it is said to "
+            "be fixed; give its poses (groundtruth.txt or joints.csv)"
         ]
     left = float(np.median([pair.left(_motion(pair)) for pair in contradicting]))
     what = (

@@ -223,7 +223,8 @@ class RecordingReader:
             kind = None
         if kind is None:
             return  # damaged, or no PNG: its turn comes when it is read
-        if kind.channels not in channels or kind.bits not in bits:
+        found = 1 if kind.palette and 3 not in channels else kind.channels  # a palette's numbers are ids
+        if found not in channels or kind.bits not in bits:
             right = f"{' or '.join(map(str, channels[:1]))} channel{'s' if channels[0] > 1 else ''} of "
             raise RecordingError(f"{where} has {kind}; it must have {right}{' or '.join(map(str, bits))} bits")
         self._check_size((kind.height, kind.width), where)
@@ -294,7 +295,7 @@ class RecordingReader:
         depth = np.where(image == INVALID, 0, image).astype(np.float32) * metres_per_unit
         return sanitize_depth(depth)
 
-    def _read_image(self, path: Path, *, jpeg: bool = False) -> NDArray:
+    def _read_image(self, path: Path, *, jpeg: bool = False, indices: bool = False) -> NDArray:
         """The image of a file, once its header has promised the camera's size."""
         try:
             content = read_bytes(path, MOST_BYTES, self._inside)
@@ -303,7 +304,7 @@ class RecordingReader:
         kind: ImageKind | None = image_kind(content)
         if kind is not None:
             self._check_size((kind.height, kind.width), str(path))
-        return decode(content, str(path), jpeg=jpeg)
+        return decode(content, str(path), jpeg=jpeg, indices=indices)
 
     def _beside(self, folder: str, color_name: str) -> Path:
         """The image in another folder that has the name of a colour image."""
@@ -313,7 +314,7 @@ class RecordingReader:
         path = self._beside(folder, color_name)
         if not is_file(path):
             return None
-        image = self._read_image(path)
+        image = self._read_image(path, indices=True)
         if image.ndim != 2 or image.dtype not in (np.uint8, np.uint16):
             raise RecordingError(f"{path}: masks have one channel of 8 or 16 bits")
         return image.astype(np.uint16)
