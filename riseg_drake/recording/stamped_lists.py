@@ -96,19 +96,27 @@ def read_table(
         return None
     text = _text(path, inside)
     numbers, lines, names = array("d"), array("q"), _heading(text, separator)
+    lost: list[LeftOut] = []
     for line, cells in _lines(text, separator):
         columns = columns or max(2, len(cells))
         if len(cells) != columns:
             raise RecordingError(f"{path}: line {line} must hold {columns} numbers, it holds {len(cells)}")
+        if _lost(cells):
+            lost.append(LeftOut(str(path), line, "it holds nan: nobody knew it at that moment"))
+            continue
         numbers.extend(_number(cell, path, line) for cell in cells)
         lines.append(line)
+    if lost and not lines:
+        raise RecordingError(
+            f"{path}: line {lost[0].line} holds 'nan' where a number should be, as all others do"
+        )
     if not lines:
         raise RecordingError(f"{path}: it holds no numbers; fill it or take it away")
     rows = np.frombuffer(numbers).reshape(len(lines), -1)
     line_numbers = np.frombuffer(lines, np.int64).astype(np.intp)
     newer, left_out = _in_order(rows[:, 0], line_numbers.tolist(), path)
     table = StampedTable(path, names, rows[newer, 0], rows[newer, 1:], line_numbers[newer])
-    return table, left_out
+    return table, lost + left_out
 
 
 def nearest_time(times: NDArray[np.float64], time: float) -> int:
@@ -158,6 +166,11 @@ def _lines(text: str, separator: str | None = None) -> Iterator[tuple[int, list[
     for number, line in enumerate(text.split("\n"), start=1):
         if line.strip() and not line.startswith(("#", "timestamp")):
             yield number, line.strip().split(separator)
+
+
+def _lost(cells: list[str]) -> bool:
+    """Whether a row says that there was nothing to measure, as trackers do that have lost their way."""
+    return any(cell.strip().lower().lstrip("+-") == "nan" for cell in cells[1:])
 
 
 def _number(cell: str, path: Path, line: int) -> float:
