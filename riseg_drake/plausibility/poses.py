@@ -88,7 +88,7 @@ class SeenPair:
         return float(np.median(np.linalg.norm(self.flow[self.used], axis=-1)))
 
     def left(self, X_C1C0: NDArray, zoom: float = 1.0) -> float:
-        """Median of what a motion leaves of the flow, pixels; of focal lengths `zoom` times as long."""
+        """Median of what a motion [4, 4] leaves of the flow, pixels; of focal lengths `zoom` times as long."""
         frame = self.first.frame
         k = frame.intrinsics
         expected = expected_flow(frame.depth, X_C1C0, replace(k, fx=k.fx * zoom, fy=k.fy * zoom))
@@ -96,7 +96,7 @@ class SeenPair:
         return float(np.median(np.where(apart < _LOST, apart, _LOST)))
 
     def left_after(self, X_C1C0: NDArray) -> float:
-        """The same, measured on the second image brought to where the motion has it: flow that is too long
+        """The same of a motion [4, 4], measured on the second image brought to where that has it: flow that is too long
         or too blank to be followed is short then, if the motion is right."""
         frame, other = self.first.frame, self.second.frame
         at = pixel_grid(*frame.depth.shape) + expected_flow(frame.depth, X_C1C0, frame.intrinsics)

@@ -86,7 +86,10 @@ class SegmentResult:
 
 
 def segment_command(request: SegmentRequest, console: Console) -> None:
-    """Segment a recording into a folder, tell how it goes, and show the scores if there are labels."""
+    """Segment a recording into a folder, tell how it goes, and show the scores if there are labels.
+
+    Raises RecordingError for what is none, and, if asked to be strict, for one that can hardly be right.
+    """
     reader = RecordingReader(request.recording, request.stamp_limit, follow=request.follow)
     scenario, seed = _parameters(request)
     view = recorded_view(reader, scenario, request.robot, request.camera_frame)
