@@ -66,5 +66,5 @@ def doubts(
 
 def _moments(count: int) -> Sequence[int]:
     """Numbers of frames spread over a recording, each with others after it."""
-    last = max(0, count - 1 - _APART)
+    last = max(count - 1 - _APART, min(count - 2, _MOMENTS - 1))
     return sorted({round(k * last / (_MOMENTS - 1)) for k in range(_MOMENTS)})

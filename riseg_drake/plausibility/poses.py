@@ -96,8 +96,8 @@ class SeenPair:
         return float(np.median(np.where(apart < _LOST, apart, _LOST)))
 
     def left_after(self, X_C1C0: NDArray) -> float:
-        """The same of a motion [4, 4], measured on the second image brought to where that has it: flow that is too long
-        or too blank to be followed is short then, if the motion is right."""
+        """The same of a motion [4, 4], measured on the second image brought to where that has it: flow that
+        is too long or too blank to be followed is short then, if the motion is right."""
         frame, other = self.first.frame, self.second.frame
         at = pixel_grid(*frame.depth.shape) + expected_flow(frame.depth, X_C1C0, frame.intrinsics)
         at = np.nan_to_num(at, nan=-1.0).astype(np.float32)
