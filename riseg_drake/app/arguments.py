@@ -204,6 +204,11 @@ def command_line() -> argparse.ArgumentParser:
     )
     _add_source(segment)
     add_export(segment)
+    segment.add_argument(
+        "--strict",
+        action="store_true",
+        help="refuse a recording that can hardly be right (it is said, and read)",
+    )
 
     convert = _add(
         subparsers,
@@ -226,6 +231,21 @@ def command_line() -> argparse.ArgumentParser:
     score.add_argument("predicted", type=Path, metavar="PREDICTED", help="folder of predicted masks")
     score.add_argument("true", type=Path, metavar="TRUE", help="folder of true masks")
     score.add_argument("--json", type=Path, metavar="FILE", help="also write all figures, per image too")
+    score.add_argument(
+        "--ignore",
+        type=_seed,
+        metavar="ID",
+        help="true value whose pixels do not count (none; VOC, DAVIS: 255)",
+    )
+    score.add_argument(
+        "--background",
+        type=_seed,
+        metavar="ID",
+        help="true value that is background beside 0 (none; the table of UOIS and OCID: 1)",
+    )
+    score.add_argument(
+        "--predicted-background", type=_seed, metavar="ID", help="the same of the predicted masks (none)"
+    )
 
     bench = _add(
         subparsers,

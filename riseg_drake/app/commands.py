@@ -96,8 +96,10 @@ def convert(chosen: argparse.Namespace, console: Console) -> None:
 def score(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg score`."""
     from riseg_drake.app.evaluate.score import score_command
+    from riseg_drake.evaluation.label_folders import LabelConventions
 
-    score_command(chosen.predicted, chosen.true, chosen.json, console)
+    conventions = LabelConventions(chosen.ignore, chosen.background, chosen.predicted_background)
+    score_command(chosen.predicted, chosen.true, chosen.json, console, conventions)
 
 
 def bench(chosen: argparse.Namespace, console: Console) -> None:

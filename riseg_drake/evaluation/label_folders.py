@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,35 +16,67 @@ class LabelFolderError(ValueError):
     """What is wrong with a folder of label images, in one line for the person who gave it."""
 
 
-def score_folders(predicted: Path, true: Path) -> Iterator[tuple[str, Scores]]:
+@dataclass(frozen=True)
+class LabelConventions:
+    """What values mean in label images that other tools wrote; 0 is background everywhere."""
+
+    ignore: int | None = None
+    """Pixels with this true value count neither way, as the rims of VOC and DAVIS have it (255)."""
+    background: int | None = None
+    """A true value that is background, too: the table of UOIS and OCID is 1."""
+    predicted_background: int | None = None
+    """The same of the prediction."""
+
+    def apply(self, prediction: NDArray, ground_truth: NDArray) -> tuple[NDArray, NDArray]:
+        """Both images [H, W] with 0 for all that is no object or does not count."""
+        ignored = ground_truth == (-1 if self.ignore is None else self.ignore)
+        none = -1 if self.background is None else self.background
+        predicted_none = -1 if self.predicted_background is None else self.predicted_background
+        return (
+            np.where(ignored | (prediction == predicted_none), 0, prediction).astype(prediction.dtype),
+            np.where(ignored | (ground_truth == none), 0, ground_truth).astype(ground_truth.dtype),
+        )
+
+
+def score_folders(
+    predicted: Path, true: Path, conventions: LabelConventions | None = None
+) -> Iterator[tuple[str, Scores]]:
     """Score every label PNG of one folder against the one of equal name in the other, in order of name.
+
+    Names may differ by an ending that all of one folder have, as 000_mask.png and 000.png do.
 
     Raises LabelFolderError if a folder is missing or empty, names or sizes are unequal, or a file is no
     label image; about names it does so before the first image is read.
     """
-    names = _label_names(predicted)
-    _check_equal_names(names, predicted, _label_names(true), true)
-    for name in names:
+    names, true_names = _label_names(predicted), _label_names(true)
+    partners = _by_ending(names, true_names) or _by_ending(true_names, names, swap=True)
+    if partners is None:
+        _check_equal_names(names, predicted, true_names, true)
+        partners = {name: name for name in names}
+    conventions = conventions or LabelConventions()
+    for name, true_name in partners.items():
         prediction = read_labels(predicted / name)
-        ground_truth = read_labels(true / name)
+        ground_truth = read_labels(true / true_name)
         if prediction.shape != ground_truth.shape:
             raise LabelFolderError(
                 f"{name}: {_size(prediction)} pixels in {predicted}, but {_size(ground_truth)} in {true}"
             )
-        yield name, score(prediction, ground_truth)
+        yield name, score(*conventions.apply(prediction, ground_truth))
 
 
 def read_labels(path: Path) -> NDArray[np.uint16]:
-    """A label image [H, W] from a PNG of one channel, 8 or 16 bits, whose values are object ids.
+    """A label image [H, W] from a PNG of one channel or with a palette, whose values are object ids.
 
     Raises LabelFolderError for anything else.
     """
     try:
-        image = read_image(path)
+        image = read_image(path, indices=True)
     except DamagedImageError as error:
         raise LabelFolderError(str(error)) from None
     if image.ndim != 2 or image.dtype not in (np.uint8, np.uint16):
-        raise LabelFolderError(f"{path} is a colour image; a label image has one channel of 8 or 16 bits")
+        raise LabelFolderError(
+            f"{path} is a colour image; a label image has one channel of 8 or 16 bits, or a palette"
+        )
     return image.astype(np.uint16)
 
 
@@ -54,6 +87,19 @@ def _label_names(folder: Path) -> list[str]:
     if not names:
         raise LabelFolderError(f"{folder} holds no PNG image")
     return names
+
+
+def _by_ending(longer: list[str], shorter: list[str], *, swap: bool = False) -> dict[str, str] | None:
+    """Which name belongs to which, where all names of one list have the same ending more; from `longer` to
+    `shorter`, or the other way about. None where it is not so."""
+    stems, others = ([Path(name).stem for name in names] for names in (longer, shorter))
+    for other in others:
+        ending = stems[0].removeprefix(other)
+        if ending and stems[0].startswith(other) and {stem + ending for stem in others} == set(stems):
+            by_stem = {Path(name).stem: name for name in longer}
+            pairs = [(by_stem[Path(name).stem + ending], name) for name in shorter]
+            return dict((b, a) if swap else (a, b) for a, b in pairs)
+    return None
 
 
 def _check_equal_names(predicted: list[str], folder: Path, true: list[str], true_folder: Path) -> None:

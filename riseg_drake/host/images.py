@@ -7,11 +7,13 @@ gigabytes; it also fills up what is missing, so that all is there is looked at h
 import struct
 import zlib
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from riseg_drake.host.files import FileError, read_bytes
 
@@ -45,6 +47,8 @@ class ImageKind:
     height: int
     channels: int
     bits: int
+    palette: bool = False
+    """Whether its pixels are numbers of colours in a table."""
 
     def __str__(self) -> str:
         return f"{self.channels} channel{'s' if self.channels > 1 else ''} of {self.bits} bits"
@@ -67,7 +71,7 @@ def image_kind(content: bytes) -> ImageKind | None:
     return None
 
 
-def read_image(path: Path, *, jpeg: bool = False, inside: Path | None = None) -> NDArray:
+def read_image(path: Path, *, jpeg: bool = False, indices: bool = False, inside: Path | None = None) -> NDArray:
     """A whole PNG image (or JPEG, where that will do), [H, W] or [H, W, channels]; see `decode`.
 
     Raises DamagedImageError.
@@ -76,13 +80,16 @@ def read_image(path: Path, *, jpeg: bool = False, inside: Path | None = None) ->
         content = read_bytes(path, MOST_BYTES, inside)
     except FileError as error:
         raise DamagedImageError(str(error)) from None
-    return decode(content, str(path), jpeg=jpeg)
+    return decode(content, str(path), jpeg=jpeg, indices=indices)
 
 
-def decode(content: bytes, name: str, *, jpeg: bool = False) -> NDArray:
+def decode(content: bytes, name: str, *, jpeg: bool = False, indices: bool = False) -> NDArray:
     """The pixels of an image as OpenCV has them: [H, W] or [H, W, channels], BGR.
 
-    `name` is what errors call it. Raises DamagedImageError: cut off, of another format, too large.
+    With `indices`, an image with a palette gives the numbers [H, W] that its pixels hold, and not their
+    colours: so are object ids written by many tools. `name` is what errors call it.
+
+    Raises DamagedImageError: cut off, of another format, too large.
     """
     unreadable = f"{name} is not a readable PNG{' or JPEG' if jpeg else ''} image"
     kind = image_kind(content)
@@ -96,6 +103,8 @@ def decode(content: bytes, name: str, *, jpeg: bool = False) -> NDArray:
     whole = _pixels_of_png(content) if is_png else _whole_jpeg(content) if jpeg else None
     if whole is None:
         raise DamagedImageError(unreadable)
+    if indices and kind.palette:
+        return _palette_indices(whole, unreadable)
     try:
         image = cv2.imdecode(np.frombuffer(whole, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:
@@ -105,6 +114,15 @@ def decode(content: bytes, name: str, *, jpeg: bool = False) -> NDArray:
     return image
 
 
+def _palette_indices(content: bytes, unreadable: str) -> NDArray[np.uint8]:
+    """OpenCV knows colours only."""
+    try:
+        with Image.open(BytesIO(content), formats=["PNG"]) as image:
+            return np.array(image, np.uint8)
+    except (OSError, SyntaxError, ValueError):
+        raise DamagedImageError(unreadable) from None
+
+
 def _kind_of_png(content: bytes) -> ImageKind | None:
     head = content[:_HEADER_BYTES]
     if len(head) < _HEADER_BYTES or head[12:16] != b"IHDR":
@@ -112,7 +130,8 @@ def _kind_of_png(content: bytes) -> ImageKind | None:
     if zlib.crc32(head[12:29]) != struct.unpack(">I", head[29:33])[0]:
         return None
     width, height, bits, color_type = struct.unpack(">IIBB", head[16:26])
-    return ImageKind(width, height, _CHANNELS.get(color_type, 0), 8 if color_type == 3 else bits)
+    palette = color_type == 3
+    return ImageKind(width, height, _CHANNELS.get(color_type, 0), 8 if palette else bits, palette)
 
 
 def _kind_of_jpeg(content: bytes) -> ImageKind | None:

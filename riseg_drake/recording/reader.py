@@ -23,7 +23,6 @@ from riseg_drake.recording.bop_scene import SCENE_CAMERA, read_bop_scene
 from riseg_drake.recording.camera_file import read_camera
 from riseg_drake.recording.image_lists import ImageLists, image_lists
 from riseg_drake.recording.layout import LeftOut, RecordedFrame, RecordingError
-from riseg_drake.recording.registration import Registration
 from riseg_drake.recording.source import STAMP_LIMIT, RecordedSource, SourceOptions
 from riseg_drake.recording.stamped_lists import (
     FEW,
@@ -125,6 +124,22 @@ class RecordingReader(RecordedSource):
             raise RecordingError(f"{path} is no folder of images; make it one or take it away")
         self._check_leads_nowhere(path)
         return any(path.iterdir())
+
+    @property
+    def names(self) -> list[tuple[str, str]]:
+        """Of each frame the colour and the depth image, as the lists have them."""
+        return [(color.name, depth.name) for color, depth in self._frames]
+
+    def images_beside(self, folder: str) -> int:
+        """How many frames have an image of their own in `robot` or `label`."""
+        return sum(is_file(self._beside(folder, color)) for color, _ in self.names)
+
+    def frame(self, number: int) -> RecordedFrame | None:
+        """One of the frames, from 0; None where it is damaged, which is noted when its turn comes."""
+        try:
+            return self._read(*self._frames[number])
+        except DamagedImageError:
+            return None
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         first_damage = ""
@@ -246,7 +261,8 @@ class RecordingReader(RecordedSource):
             kind = None
         if kind is None:
             return  # damaged, or no PNG: its turn comes when it is read
-        if kind.channels not in channels or kind.bits not in bits:
+        found = 1 if kind.palette and 3 not in channels else kind.channels  # a palette's numbers are ids
+        if found not in channels or kind.bits not in bits:
             right = f"{' or '.join(map(str, channels[:1]))} channel{'s' if channels[0] > 1 else ''} of "
             raise RecordingError(f"{where} has {kind}; it must have {right}{' or '.join(map(str, bits))} bits")
         self._check_size((kind.height, kind.width), where, shape)
@@ -292,7 +308,7 @@ class RecordingReader(RecordedSource):
             image = np.where(image == INVALID, 0, image)
         return sanitize_depth(image.astype(np.float32) * metres_per_unit)
 
-    def _read_image(self, path: Path, *, jpeg: bool = False) -> NDArray:
+    def _read_image(self, path: Path, *, jpeg: bool = False, indices: bool = False) -> NDArray:
         """The image of a file, once its header has promised the camera's size."""
         try:
             content = read_bytes(path, MOST_BYTES, self._inside)
@@ -301,7 +317,7 @@ class RecordingReader(RecordedSource):
         kind: ImageKind | None = image_kind(content)
         if kind is not None:
             self._check_size((kind.height, kind.width), str(path))
-        return decode(content, str(path), jpeg=jpeg)
+        return decode(content, str(path), jpeg=jpeg, indices=indices)
 
     def _beside(self, folder: str, color_name: str) -> Path:
         """The image in another folder that has the name of a colour image, or its stem, as of a JPEG."""
@@ -312,7 +328,7 @@ class RecordingReader(RecordedSource):
         path = self._beside(folder, color_name)
         if not is_file(path):
             return None
-        image = self._read_image(path)
+        image = self._read_image(path, indices=True)
         if image.ndim != 2 or image.dtype not in (np.uint8, np.uint16):
             raise RecordingError(f"{path}: masks have one channel of 8 or 16 bits")
         return self._registration.registered_mask(image.astype(np.uint16))

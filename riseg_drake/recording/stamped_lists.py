@@ -17,6 +17,9 @@ FEW = 1 / 20
 """Share of a list that may be out of order, or whose files may be missing, and is left out; where it is
 more, the list is not what it says."""
 
+_COUNTED = (1.1e15, 4e18)
+"""Microseconds since 1970 as of 2004, and nanoseconds as of 2096; no number of seconds, metres or radians."""
+
 _GAP = 5.0
 """Between two rows of a table further apart than so many stamp limits nothing is interpolated."""
 
@@ -94,19 +97,27 @@ def read_table(
         return None
     text = _text(path, inside)
     numbers, lines, names = array("d"), array("q"), _heading(text, separator)
+    lost: list[LeftOut] = []
     for line, cells in _lines(text, separator):
         columns = columns or max(2, len(cells))
         if len(cells) != columns:
             raise RecordingError(f"{path}: line {line} must hold {columns} numbers, it holds {len(cells)}")
+        if _lost(cells):
+            lost.append(LeftOut(str(path), line, "it holds nan: nobody knew it at that moment"))
+            continue
         numbers.extend(_number(cell, path, line) for cell in cells)
         lines.append(line)
+    if lost and not lines:
+        raise RecordingError(
+            f"{path}: line {lost[0].line} holds 'nan' where a number should be, as all others do"
+        )
     if not lines:
         raise RecordingError(f"{path}: it holds no numbers; fill it or take it away")
     rows = np.frombuffer(numbers).reshape(len(lines), -1)
     line_numbers = np.frombuffer(lines, np.int64).astype(np.intp)
     newer, left_out = _in_order(rows[:, 0], line_numbers.tolist(), path)
     table = StampedTable(path, names, rows[newer, 0], rows[newer, 1:], line_numbers[newer])
-    return table, left_out
+    return table, lost + left_out
 
 
 def pose_between(poses: StampedTable, time: float, limit: float) -> NDArray[np.float64] | None:
@@ -182,11 +193,22 @@ def _lines(text: str, separator: str | None = None, pieces: int = 0) -> Iterator
             yield number, line.strip().split(separator, pieces - 1)
 
 
+def _lost(cells: list[str]) -> bool:
+    """Whether a row says that there was nothing to measure, as trackers do that have lost their way."""
+    return any(cell.strip().lower().lstrip("+-") == "nan" for cell in cells[1:])
+
+
 def _number(cell: str, path: Path, line: int) -> float:
     try:
         value = float(cell)
     except ValueError:
         value = np.nan
+    if _COUNTED[0] < value < _COUNTED[1]:
+        unit, times = ("microseconds", "1e6") if value < 1e17 else ("nanoseconds", "1e9")
+        raise RecordingError(
+            f"{path}: line {line} holds {cell}, which looks like {unit} since 1970; stamps are seconds: "
+            f"divide by {times}"
+        )
     # What is no number of seconds, metres or radians would overflow later on.
     if not abs(value) < 1e15:
         raise RecordingError(f"{path}: line {line} holds {cell!r} where a number should be")

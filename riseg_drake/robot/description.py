@@ -1,6 +1,7 @@
 """Which arm, with which tool: from model files into a MultibodyPlant."""
 
 import math
+import re
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
@@ -14,6 +15,7 @@ from pydrake.multibody.tree import FixedOffsetFrame, Frame, ModelInstanceIndex
 from riseg_drake.robot.limits import ROBOTS, RobotLimits
 
 MODELS_PACKAGE = "riseg_drake_models"
+_PACKAGE_NAMED = re.compile(r"(?:package|model)://([^/\s\"'<>]+)/")
 JOINT_NAMES = tuple(f"panda_joint{i}" for i in range(1, 8))
 
 
@@ -71,6 +73,26 @@ def register_models(parser: Parser) -> None:
     packages = parser.package_map()
     if not packages.Contains(MODELS_PACKAGE):
         packages.Add(MODELS_PACKAGE, str(models_folder()))
+
+
+def find_packages(parser: Parser, file: Path) -> None:
+    """Make the `package://NAME/` and `model://NAME/` known to a parser that lie beside a file.
+
+    As ROS has it, NAME is the package (package.xml) that the file lies in; as Gazebo has it, a folder that it
+    lies in, or one beside such a folder.
+    """
+    packages = parser.package_map()
+    folders = file.resolve().parents
+    for folder in folders:
+        if (folder / "package.xml").is_file():
+            packages.AddPackageXml(str(folder / "package.xml"))
+            break
+    for name in sorted(set(_PACKAGE_NAMED.findall(file.read_text(errors="replace")))):
+        found = (
+            at for at in (*folders, *(folder / name for folder in folders)) if at.name == name and at.is_dir()
+        )
+        if not packages.Contains(name) and (beside := next(found, None)):
+            packages.Add(name, str(beside))
 
 
 def add_panda(plant: MultibodyPlant, description: PandaDescription) -> PandaParts:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, ModelInstanceIndex
 from pydrake.planning import RobotDiagramBuilder
 
-from riseg_drake.robot.description import register_models
+from riseg_drake.robot.description import find_packages, register_models
 
 
 class OwnRobotError(ValueError):
@@ -37,17 +38,15 @@ class OwnRobot:
         """
         if not file.is_file():
             raise OwnRobotError(f"{file} is not there; --robot names a URDF or SDF file")
-        builder = RobotDiagramBuilder(time_step=0.0)
-        self.plant: MultibodyPlant = builder.plant()
-        parser = Parser(self.plant)
-        register_models(parser)
-        _find_packages(parser, file)
         try:
-            self._models = tuple(parser.AddModels(str(file)))
-            _bolt_bases(self.plant, self._models)
-            self.plant.Finalize()
+            builder, self._models = _parsed(file, None)
         except (RuntimeError, ValueError) as error:
-            raise OwnRobotError(f"{file}: {' '.join(str(error).split())}") from None
+            # A robot is looked at here, and touches nothing: its collision shapes shall not decide.
+            try:
+                builder, self._models = _parsed(file, _without_collisions(file))
+            except (RuntimeError, ValueError, ElementTree.ParseError):
+                raise OwnRobotError(f"{file}: {' '.join(str(error).split())}") from None
+        self.plant: MultibodyPlant = builder.plant()
         self._camera_frame = self._frame(file, camera_frame)
         self._diagram = builder.Build()
         self._root = self._diagram.CreateDefaultContext()
@@ -104,14 +103,39 @@ class OwnRobot:
         return list(by_name.values())
 
 
-def _find_packages(parser: Parser, file: Path) -> None:
-    """Make `package://` work as in ROS: packages on the path, and the one that the file lies in."""
-    packages = parser.package_map()
-    packages.PopulateFromRosPackagePath()
-    for folder in file.resolve().parents:
-        if (folder / "package.xml").is_file():
-            packages.AddPackageXml(str(folder / "package.xml"))
-            return
+def _parsed(file: Path, text: str | None) -> tuple[RobotDiagramBuilder, tuple[ModelInstanceIndex, ...]]:
+    """The robot of a file, bolted down; of another text in its place, if one is given."""
+    builder = RobotDiagramBuilder(time_step=0.0)
+    plant = builder.plant()
+    parser = Parser(plant)
+    register_models(parser)
+    parser.package_map().PopulateFromRosPackagePath()
+    find_packages(parser, file)
+    added = parser.AddModels(str(file)) if text is None else parser.AddModelsFromString(text, file.suffix[1:])
+    models = tuple(added)
+    _bolt_bases(plant, models)
+    plant.Finalize()
+    return builder, models
+
+
+def _without_collisions(file: Path) -> str:
+    """A URDF or SDF without collision shapes, that may be read from anywhere."""
+    ElementTree.register_namespace("drake", "http://drake.mit.edu")
+    root = ElementTree.parse(file).getroot()
+    for element in root.iter():
+        for collision in element.findall("collision"):
+            element.remove(collision)
+    for mesh in root.iter("mesh"):
+        named = mesh.find("uri")
+        uri = (named.text or "").strip() if named is not None else mesh.get("filename", "")
+        if "://" in uri:
+            continue
+        at = (file.resolve().parent / uri).as_uri()
+        if named is not None:
+            named.text = at
+        else:
+            mesh.set("filename", at)
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 def _bolt_bases(plant: MultibodyPlant, models: tuple[ModelInstanceIndex, ...]) -> None:

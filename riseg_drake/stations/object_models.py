@@ -17,6 +17,7 @@ from pydrake.multibody.tree import RigidBody
 
 from riseg_drake.host.model_files import ModelFileError, reading_model
 from riseg_drake.host.terminal import one_line
+from riseg_drake.robot.description import find_packages, register_models
 from riseg_drake.stations.contact import touches_over_area
 from riseg_drake.stations.footprint import Footprint, footprint, shape_corners
 from riseg_drake.stations.roundness import axes_of_revolution
@@ -90,9 +91,10 @@ def parse_body(plant: MultibodyPlant, path: Path) -> RigidBody:
     """Add a model of one body to a plant, renamed where its name is taken. Raises SceneError."""
     parser = Parser(plant)
     parser.SetAutoRenaming(True)
-    parser.package_map().Add("riseg_drake_models", Path(str(files("riseg_drake.models"))))
+    register_models(parser)
     try:
         with reading_model(path):
+            find_packages(parser, path)
             instances = parser.AddModels(path)
     except (ModelFileError, RuntimeError, ValueError, SystemExit) as error:  # SystemExit: Drake's assertions
         raise SceneError(f"{path} cannot be read: {one_line(error)}") from error

@@ -122,6 +122,13 @@ def millimetres_taken_for_metres(patch):
     main(["segment", "my_recording"])
 
 
+def a_fifth_of_the_size(patch):
+    write(Path("my_recording"), drawn_frames(3))
+    camera = json.loads(Path("my_recording/camera.json").read_text())
+    Path("my_recording/camera.json").write_text(json.dumps({**camera, "depth_scale": 5000}))
+    main(["segment", "my_recording"])
+
+
 def misspelt(patch):
     Path("scenario.yaml").write_text("sation: {}\n")
     main(["run", "scenario.yaml"])
@@ -182,6 +189,7 @@ PROVOKED = dict(
             nothing_moves,
             no_table,
             millimetres_taken_for_metres,
+            a_fifth_of_the_size,
             misspelt,
             somebody_elses_folder,
             earlier_run,

@@ -1,8 +1,14 @@
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
-from riseg_drake.evaluation.label_folders import LabelFolderError, read_labels, score_folders
+from riseg_drake.evaluation.label_folders import (
+    LabelConventions,
+    LabelFolderError,
+    read_labels,
+    score_folders,
+)
 
 
 @pytest.fixture
@@ -111,3 +117,47 @@ def test_a_colour_image_is_none_of_labels_in_any_depth(tmp_path, kind):
     write(tmp_path / "x.png", np.zeros((4, 4, 3), kind))
     with pytest.raises(LabelFolderError, match=r"x\.png is a colour image"):
         read_labels(tmp_path / "x.png")
+
+
+@pytest.mark.parametrize("bits", [1, 2, 4, 8])
+def test_the_numbers_of_a_palette_are_the_ids_whatever_their_colours(tmp_path, bits):
+    ids = (np.arange(12).reshape(3, 4) % 2**bits).astype(np.uint8)
+    image = Image.fromarray(ids).convert("L")
+    image.putpalette([7, 7, 7, 200, 0, 0, *[9] * 30])
+    image.save(tmp_path / "x.png", bits=bits)
+    np.testing.assert_array_equal(read_labels(tmp_path / "x.png"), ids)
+
+
+def test_names_may_differ_by_an_ending_of_one_folder(folders):
+    predicted, true = folders
+    for number in range(3):
+        write(predicted / f"00{number}_mask.png", np.full((4, 4), number, np.uint8))
+        write(true / f"00{number}.png", np.full((4, 4), number, np.uint8))
+    for one, other in ((predicted, true), (true, predicted)):
+        scores = dict(score_folders(one, other))
+        assert list(scores) == sorted(path.name for path in one.iterdir())
+        assert all(figures.overlap_f == 1 for figures in scores.values())
+
+
+def test_what_is_to_be_ignored_counts_neither_way(folders):
+    """An object of 4 pixels, 2 of them in the rim, which the prediction has, too: 255 is no object."""
+    predicted, true = folders
+    labels = np.zeros((6, 6), np.uint8)
+    labels[2, 1:3], labels[3, 1:3] = 1, 255
+    write(true / "a.png", labels)
+    write(predicted / "a.png", np.where(labels > 0, 5, 0).astype(np.uint8))
+    assert dict(score_folders(*folders))["a.png"].overlap_f < 1
+    scores = dict(score_folders(*folders, LabelConventions(ignore=255)))["a.png"]
+    assert (scores.overlap_f, scores.boundary_f) == (1, 1)
+
+
+def test_another_value_may_be_background_in_one_folder_alone(folders):
+    predicted, true = folders
+    labels = np.ones((6, 6), np.uint8)
+    labels[2:4, 2:4] = 2
+    write(true / "a.png", labels)
+    write(predicted / "a.png", labels - 1)
+    assert dict(score_folders(*folders, LabelConventions(background=1)))["a.png"].overlap_f == 1
+    assert (
+        dict(score_folders(true, predicted, LabelConventions(predicted_background=1)))["a.png"].overlap_f == 1
+    )

@@ -207,3 +207,29 @@ def test_the_nearest_time_is_the_one_least_apart(time, nearest):
 def test_a_name_may_hold_spaces(file):
     ((entry,), _) = read_file_list(file("0.5  rgb/my first image.png  \n"))
     assert (entry.time, entry.name) == (0.5, "rgb/my first image.png")
+def test_a_row_that_nobody_knew_is_left_out_and_the_others_stay(file):
+    """Trackers that have lost their way write nan; a whole recording shall not be lost with it."""
+    path = file("0.0 1 2", "0.1 nan nan", "0.2 3 -NaN", "0.3 5 6")
+    table, left_out = read_table(path, 3)
+    np.testing.assert_array_equal(table.times, [0.0, 0.3])
+    np.testing.assert_array_equal(table.values, [[1, 2], [5, 6]])
+    assert [(line.line, line.why.split(":")[0]) for line in left_out] == [
+        (2, "it holds nan"),
+        (3, "it holds nan"),
+    ]
+
+
+def test_a_table_of_nothing_known_is_none(file):
+    with pytest.raises(RecordingError, match="line 1 holds 'nan' where a number should be"):
+        read_table(file("0.0 nan", "0.1 nan"), 2)
+
+
+@pytest.mark.parametrize(
+    ("stamp", "unit", "divisor"),
+    [("1305031102175304000", "nanoseconds", "1e9"), ("1305031102175304", "microseconds", "1e6")],
+)
+def test_stamps_that_count_since_1970_in_other_units_are_called_so(file, stamp, unit, divisor):
+    with pytest.raises(
+        RecordingError, match=f"line 1 holds {stamp}, which looks like {unit}.*divide by {divisor}"
+    ):
+        read_file_list(file(f"{stamp} a.png"))

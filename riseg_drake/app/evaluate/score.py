@@ -6,19 +6,25 @@ from rich.console import Console
 
 from riseg_drake.app.output_folder import to_json, write_told
 from riseg_drake.app.tables import score_table
-from riseg_drake.evaluation.label_folders import score_folders
+from riseg_drake.evaluation.label_folders import LabelConventions, score_folders
 from riseg_drake.evaluation.scores import mean_scores
 
 MOST_ROWS = 20
 """More images than this are not listed one by one on the terminal."""
 
 
-def score_command(predicted: Path, true: Path, json_file: Path | None, console: Console) -> None:
+def score_command(
+    predicted: Path,
+    true: Path,
+    json_file: Path | None,
+    console: Console,
+    conventions: LabelConventions | None = None,
+) -> None:
     """Print the mean figures of two folders; write them, and those of every image, to a JSON file.
 
     Raises LabelFolderError for folders that cannot be compared, OutputError where the file cannot be written.
     """
-    images = dict(score_folders(predicted, true))
+    images = dict(score_folders(predicted, true, conventions))
     mean = mean_scores(list(images.values()))
     if json_file is not None:
         content = {

@@ -17,6 +17,7 @@ from riseg_drake.app.exports import Exports, exporting
 from riseg_drake.app.output import RECORDING, confidence_figures, stage_figures
 from riseg_drake.app.run.command import peak_memory_mb
 from riseg_drake.app.scenario import Scenario, load_scenario
+from riseg_drake.app.segment.doubts import frames_with, recording_doubts
 from riseg_drake.app.segment.folder import SegmentFolder
 from riseg_drake.app.segment.recorded_view import RecordedView, recorded_view
 from riseg_drake.app.segment.replay import Replay
@@ -67,6 +68,8 @@ class SegmentRequest:
     """Formats of other tools."""
     export_frames: tuple[int, ...] = ()
     """Numbers of the frames for Contact-GraspNet, from 0; the last one if there are none."""
+    strict: bool = False
+    """Whether what can hardly be is an error, and not a warning."""
 
 
 @dataclass
@@ -95,7 +98,10 @@ class SegmentResult:
 
 
 def segment_command(request: SegmentRequest, console: Console) -> None:
-    """Segment a recording into a folder, tell how it goes, and show the scores if there are labels."""
+    """Segment a recording into a folder, tell how it goes, and show the scores if there are labels.
+
+    Raises RecordingError for what is none, and, if asked to be strict, for one that can hardly be right.
+    """
     options = SourceOptions(
         request.stamp_limit,
         request.follow,
@@ -107,6 +113,11 @@ def segment_command(request: SegmentRequest, console: Console) -> None:
     reader = opened_source(request.recording, options)
     scenario, seed = _parameters(request)
     view = recorded_view(reader, scenario, request.robot, request.camera_frame)
+    doubts = recording_doubts(reader, view)
+    if request.strict and (odd := [*reader.warnings, *doubts]):
+        raise RecordingError("; ".join(odd))
+    view.warnings.extend(doubts)
+    having = frames_with(reader)
     about = {
         "recording": str(request.recording),
         "width": reader.intrinsics.width,
@@ -114,6 +125,7 @@ def segment_command(request: SegmentRequest, console: Console) -> None:
         "rate_hz": round(reader.rate, 3),
         "camera_poses": view.camera_poses,
         "robot_pixels": view.robot_pixels,
+        "frames_with": having,
         "seed": seed,
     }
     output = request.output or Path("out") / f"segment_{_recording_name(request.recording)}"
@@ -126,6 +138,9 @@ def segment_command(request: SegmentRequest, console: Console) -> None:
     ):
         console.print(f"{len(reader)} frames of {request.recording}, results in {output}", highlight=False)
         console.print(f"camera poses: {view.camera_poses}; robot pixels: {view.robot_pixels}", highlight=False)
+        console.print(
+            "frames with " + ", ".join(f"{name}: {number}" for name, number in having.items()), highlight=False
+        )
         _segment(reader, view, Replay(scenario, view.view, seed), folder, exports, clock, result, console)
     _report(result, clock, output, console)
     exports.tell(console)
@@ -144,6 +159,7 @@ def _segment(
     """Put every frame through Alg. 2 and write what comes of it."""
     clock.watch(replay.stages)
     told = _Told(console)
+    told.tell(view.warnings)
     with Progress(
         TextColumn("frames"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console
     ) as progress:

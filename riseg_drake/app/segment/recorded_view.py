@@ -1,13 +1,18 @@
 """Who says where a recording's camera was and what the robot hid: its joints, its files, or nobody."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from riseg_drake.app.scenario import Scenario
+from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.host.model_files import ModelFileError, reading_model
 from riseg_drake.host.terminal import one_line
 from riseg_drake.recording import layout
-from riseg_drake.recording.layout import RecordingError
+from riseg_drake.recording.layout import RecordedFrame, RecordingError
 from riseg_drake.recording.source import RecordedSource
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.robot.own_robot import OwnRobot, OwnRobotError
@@ -15,6 +20,8 @@ from riseg_drake.robot.silhouette import Kinematics, RobotSilhouette, UnknownSha
 from riseg_drake.systems.frame_view import FrameView
 
 PANDA_JOINTS = 7
+FIXED = "fixed camera"
+"""Where poses come from if nobody tells any."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +32,27 @@ class RecordedView:
     camera_poses: str
     robot_pixels: str
     warnings: list[str]
+    X_WC: Callable[[NDArray], NDArray] | None = None
+    """The camera's pose at joint angles; None where it follows from none."""
+    robot_mask: Callable[[NDArray], NDArray] | None = None
+    """The robot's own pixels at joint angles; None where they follow from none."""
+
+    def frame(self, recorded: RecordedFrame) -> Frame:
+        """A recorded frame as the algorithm sees it, but for its number."""
+        X_WC, robot = recorded.X_WC, recorded.robot
+        if self.X_WC is not None and recorded.position is not None:
+            X_WC = self.X_WC(recorded.position)
+        if robot is None and self.robot_mask is not None and recorded.position is not None:
+            robot = self.robot_mask(recorded.position)
+        return Frame(
+            sequence=0,
+            time=recorded.time,
+            intrinsics=self.view.intrinsics,
+            color=recorded.color,
+            depth=recorded.depth,
+            X_WC=np.eye(4) if X_WC is None else X_WC,
+            robot=np.zeros(recorded.depth.shape, bool) if robot is None else robot,
+        )
 
 
 def recorded_view(
@@ -38,7 +66,7 @@ def recorded_view(
 
     Raises RecordingError or OwnRobotError.
     """
-    masks = reader.holds_images(layout.ROBOT_FOLDER)
+    masks = reader.holds_images(layout.ROBOT_FOLDER) and reader.images_beside(layout.ROBOT_FOLDER) > 0
     if reader.joints is None:
         if robot is not None:
             raise RecordingError(
@@ -46,7 +74,7 @@ def recorded_view(
             )
         return RecordedView(
             FrameView(reader.intrinsics, None, None),
-            camera_poses=reader.camera_poses or "fixed camera",
+            camera_poses=reader.camera_poses or FIXED,
             robot_pixels=f"{layout.ROBOT_FOLDER}/" if masks else "none",
             warnings=[],
         )
@@ -63,6 +91,8 @@ def recorded_view(
         camera_poses=reader.joints.path.name,
         robot_pixels=source,
         warnings=warnings,
+        X_WC=kinematics.X_WC,
+        robot_mask=robot_mask,
     )
 
 

@@ -183,3 +183,32 @@ def test_a_recorded_run_gives_the_masks_of_the_run_bit_for_bit_in_every_frame(
     for mask, time in zip(found.values(), times, strict=True):
         np.testing.assert_array_equal(mask, seen[time])
     assert any(mask.any() for mask in seen.values())
+
+
+def test_what_is_doubted_is_a_warning_and_an_error_if_asked_for(recording, capsys):
+    camera = json.loads((recording / "camera.json").read_text())
+    (recording / "camera.json").write_text(json.dumps({**camera, "depth_scale": 1250}))
+    _, summary = segment(recording)
+    (line,) = (warning for warning in summary["warnings"] if "is the unit of no camera" in warning)
+    assert capsys.readouterr().out.count(line) == 1
+    output = recording.parent / "strict"
+    assert main(["segment", str(recording), "--output", str(output), "--strict"]) == 2
+    assert line in capsys.readouterr().err
+    assert not output.exists()
+
+
+def test_a_right_recording_is_not_doubted(recording):
+    _, summary = segment(recording, "--strict")
+    assert summary["warnings"] == []
+    assert summary["frames_with"] == {"depth": 8, "pose": 8, "label": 8}
+
+
+def test_robot_masks_that_are_named_otherwise_are_said_and_not_claimed(tmp_path, pushed):
+    frames = [replace(frame, robot=np.zeros(SMALL.shape, bool)) for frame in pushed]
+    recording = write(tmp_path / "recording", frames)
+    for path in (recording / "robot").iterdir():
+        path.rename(path.with_name(f"robot of {path.name}"))
+    _, summary = segment(recording)
+    assert summary["robot_pixels"] == "none"
+    assert summary["frames_with"]["robot mask"] == 0
+    assert any(line.startswith("robot/ is not used") for line in summary["warnings"])

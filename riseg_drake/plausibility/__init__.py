@@ -1,0 +1,1 @@
+"""Whether a recording can be what it says it is, asked of a few frames before any work (not in the paper)."""
