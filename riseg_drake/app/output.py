@@ -1,7 +1,8 @@
 """The folder a run leaves behind: pictures and masks of every step, and a summary of them all.
 
     summary.json
-    step_0/ color.png  depth.png  mask.png  untouched.png  overlay.png  ground_truth.png  refined.png
+    step_0/ color.png  depth.png  mask.png  mask_color.png  untouched.png  overlay.png  ground_truth.png
+            refined.png
     step_1/ ...
 
 `refined.png` is there with a SAM, `ground_truth.png` where the truth is known. Whenever the run is
@@ -24,6 +25,7 @@ from riseg_drake.evaluation.in_motion import InMotion
 from riseg_drake.evaluation.scores import Scores
 from riseg_drake.host.processes import undisturbed
 from riseg_drake.pictures.masks import draw_masks
+from riseg_drake.pictures.object_colors import object_colors
 from riseg_drake.recording.whole_file import write_png
 from riseg_drake.recording.writer import depth_to_millimetres
 
@@ -96,6 +98,7 @@ class RunFolder:
                 write_png(unfinished / "color.png", step.color)
                 write_png(unfinished / "depth.png", depth_to_millimetres(step.depth))
                 write_png(unfinished / "mask.png", step.mask.astype(np.uint16))
+                write_png(unfinished / "mask_color.png", object_colors(step.mask))
                 if step.untouched is not None:
                     write_png(unfinished / "untouched.png", step.untouched)
                 write_png(

@@ -121,16 +121,23 @@ def _segment(
     clock.watch(replay.stages)
     told = _Told(console)
     with Progress(
-        TextColumn("frames"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console
+        TextColumn("frames"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]}"),
+        TimeRemainingColumn(),
+        console=console,
     ) as progress:
-        bar = progress.add_task("frames", total=len(reader))
+        bar, start = progress.add_task("frames", total=len(reader), rate=""), perf_counter()
         for frame in reader:
             _take(frame, reader, replay, folder, result)
             result.left_out, result.warnings = reader.left_out, [*view.warnings, *reader.warnings]
             told.tell([*result.warnings, *map(str, result.left_out)])
             for times in clock.seconds.values():
                 del times[:-MOST_TIMES]
-            progress.update(bar, completed=min(result.frames + len(result.left_out), len(reader)))
+            taken = result.frames + len(result.left_out)
+            rate = f"{taken / (perf_counter() - start):.1f} frames/s"
+            progress.update(bar, completed=min(taken, len(reader)), rate=rate)
         told.tell([*result.warnings, *map(str, result.left_out)])
         progress.update(bar, completed=len(reader))
     if result.frames == 0:
