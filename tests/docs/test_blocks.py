@@ -73,6 +73,7 @@ EXECUTED: dict[str, tuple[Callable[[list[str]], list[str] | None], str]] = {
     "segment": (of_that_robot, "executed as it stands"),
     "score": (lambda words: words, "executed as it stands"),
     "diagram": (lambda words: words, "executed as it stands"),
+    "doctor": (lambda words: words, "executed as it stands"),
     "bench": (lambda words: None, "measures for a minute; tests/app/bench/test_stop_bench.py has its parts"),
     "emulate": (
         lambda words: None,

@@ -19,6 +19,7 @@ from riseg_drake.app.scenario import Scenario, load_scenario
 from riseg_drake.app.segment.folder import SegmentFolder
 from riseg_drake.app.segment.recorded_view import RecordedView, recorded_view
 from riseg_drake.app.segment.replay import Replay
+from riseg_drake.app.segment.report import Album
 from riseg_drake.app.tables import score_table, stage_table
 from riseg_drake.app.work_state import end_noted
 from riseg_drake.evaluation.scores import FIGURES, Scores, score
@@ -75,6 +76,10 @@ class SegmentResult:
     """[10], of the ten figures over them."""
     left_out: list[LeftOut] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    start: float = 0.0
+    """Time stamp of the first frame, s."""
+    album: Album = field(default_factory=Album)
+    """What the report shows."""
 
     @property
     def mean(self) -> Scores:
@@ -162,8 +167,13 @@ def _take(
         result.sums += astuple(scores)
         result.scored += 1
     segmentation = replay.segmentation
-    folder.write(frame.name, frame.color, mask, segmentation.confidence, scores)
+    if result.frames == 0:
+        result.start = frame.time
     result.frames += 1
+    share = (result.frames + len(result.left_out)) / len(reader)
+    time = frame.time - result.start
+    folder.write(frame.name, frame.color, mask, segmentation.confidence, scores, time, share)
+    result.album.look(frame, segmentation)
     result.object_ids, result.confidence = segmentation.object_ids, segmentation.confidence
 
 
@@ -246,6 +256,9 @@ def _state_of(folder: SegmentFolder, result: SegmentResult, clock: StageClock) -
             seconds=round(perf_counter() - start, 2),
             peak_memory_mb=peak_memory_mb(),
         )
+        folder.write_report(
+            result.album.page(folder.summary, _score_rows(result), stage_figures(clock.seconds))
+        )
 
     with end_noted(finish, lambda: f"{_masks(result.frames)} in {folder.path}"):
         yield
@@ -261,9 +274,14 @@ def _report(result: SegmentResult, clock: StageClock, output: Path, console: Con
     )
     if result.last is not None:
         console.print("\nscores in percent")
-        rows = [(f"mean of {result.scored}", result.mean), ("last", result.last)]
-        console.print(score_table(rows, first="\nframes"))
+        console.print(score_table(_score_rows(result), first="\nframes"))
     console.print(stage_table(stage_figures(clock.seconds), title="time of each stage"))
+
+
+def _score_rows(result: SegmentResult) -> list[tuple[str, Scores]]:
+    if result.last is None:
+        return []
+    return [(f"mean of {result.scored}", result.mean), ("last", result.last)]
 
 
 def _masks(number: int) -> str:
