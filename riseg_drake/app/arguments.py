@@ -169,7 +169,13 @@ def command_line() -> argparse.ArgumentParser:
         "Find the objects of a recording, without a robot: masks, a video, and scores where there are labels.\n"
         "A recording is a folder in the TUM RGB-D layout with a camera.json, see docs/recordings.md.",
     )
-    segment.add_argument("recording", type=Path, metavar="RECORDING", help="its folder")
+    segment.add_argument(
+        "recording",
+        type=Path,
+        nargs="?",
+        metavar="RECORDING",
+        help="its folder (the sample that ships with it)",
+    )
     segment.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/segment_NAME)")
     _add_overwrite(segment, "segmentation")
     segment.add_argument(

@@ -148,7 +148,7 @@ def scores_table(rows: Iterable[tuple[str, Scores]], first: str) -> Table:
                         scores.boundary_f,
                     )
                 ),
-                f"{scores.objects_found:g} of {scores.objects_true:g}",
+                f"{round(scores.objects_found, 1):g} of {round(scores.objects_true, 1):g}",
             )
             for name, scores in rows
         ],

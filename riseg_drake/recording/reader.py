@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -290,8 +291,9 @@ class RecordingReader:
         return decode(content, str(path), jpeg=jpeg)
 
     def _beside(self, folder: str, color_name: str) -> Path:
-        """The image in another folder that has the name of a colour image."""
-        return self.folder / folder / Path(color_name).name
+        """The PNG image in another folder that has the name of a colour image, a JPEG's but for its ending."""
+        name = Path(color_name).name
+        return self.folder / folder / re.sub(r"\.jpe?g$", ".png", name, flags=re.IGNORECASE)
 
     def _read_beside(self, folder: str, color_name: str) -> NDArray[np.uint16] | None:
         path = self._beside(folder, color_name)

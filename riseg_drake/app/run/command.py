@@ -16,6 +16,7 @@ from rich.status import Status
 from riseg_drake.app.diagram import WiredDiagram, make_diagram
 from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step
+from riseg_drake.app.report_page import REPORT
 from riseg_drake.app.run.interactions import Listener, Progress, interactions, simulated_truth
 from riseg_drake.app.run.recording import recording_of
 from riseg_drake.app.run.report import pooled_stages, run_report
@@ -60,6 +61,7 @@ def run_command(request: RunRequest, console: Console) -> None:
         with console.status("placing the objects") as status:
             steps = run(scenario, seed, folder, request.record, browser, Narrator(console, status))
     report(steps, console)
+    console.print(f"to look at: {path / REPORT}", highlight=False, soft_wrap=True)
 
 
 def run(

@@ -5,6 +5,7 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, astuple, dataclass, field
+from importlib.resources import files
 from pathlib import Path
 from time import perf_counter
 
@@ -14,9 +15,10 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from riseg_drake.app.output import RECORDING, confidence_figures, stage_figures
+from riseg_drake.app.report_page import REPORT
 from riseg_drake.app.run.command import peak_memory_mb
 from riseg_drake.app.scenario import Scenario, load_scenario
-from riseg_drake.app.segment.folder import SegmentFolder
+from riseg_drake.app.segment.folder import VIDEO, SegmentFolder
 from riseg_drake.app.segment.recorded_view import RecordedView, recorded_view
 from riseg_drake.app.segment.replay import Replay
 from riseg_drake.app.segment.report import Album
@@ -38,11 +40,15 @@ MOST_TIMES = 10_000
 """Calls of each stage whose time is kept: a recording may be longer than memory."""
 
 
+SAMPLE = Path(str(files("riseg_drake.recording") / "sample"))
+"""A recorded run of three toys that ships with the package; tests/recording/make_sample.py made it."""
+
+
 @dataclass(frozen=True)
 class SegmentRequest:
     """What a person asks of `riseg segment`."""
 
-    recording: Path
+    recording: Path = SAMPLE
     output: Path | None = None
     scenario: Path | None = None
     """Parameters; those of the recorded run, or the built-in ones, if None."""
@@ -107,7 +113,8 @@ def segment_command(request: SegmentRequest, console: Console) -> None:
         SegmentFolder(output, reader.rate, about, overwrite=request.overwrite) as folder,
         _state_of(folder, result, clock),
     ):
-        console.print(f"{len(reader)} frames of {request.recording}, results in {output}", highlight=False)
+        what = "the sample recording" if request.recording == SAMPLE else request.recording
+        console.print(f"{len(reader)} frames of {what}, results in {output}", highlight=False)
         console.print(f"camera poses: {view.camera_poses}; robot pixels: {view.robot_pixels}", highlight=False)
         _segment(reader, view, Replay(scenario, view.view, seed), folder, clock, result, console)
     _report(result, clock, output, console)
@@ -256,9 +263,9 @@ def _state_of(folder: SegmentFolder, result: SegmentResult, clock: StageClock) -
             seconds=round(perf_counter() - start, 2),
             peak_memory_mb=peak_memory_mb(),
         )
-        folder.write_report(
-            result.album.page(folder.summary, _score_rows(result), stage_figures(clock.seconds))
-        )
+        title = f"{_recording_name(Path(folder.summary['recording']))}, segmented"
+        stages = stage_figures(clock.seconds)
+        folder.write_report(result.album.page(title, folder.summary, _score_rows(result), stages))
 
     with end_noted(finish, lambda: f"{_masks(result.frames)} in {folder.path}"):
         yield
@@ -276,6 +283,7 @@ def _report(result: SegmentResult, clock: StageClock, output: Path, console: Con
         console.print("\nscores in percent")
         console.print(score_table(_score_rows(result), first="\nframes"))
     console.print(stage_table(stage_figures(clock.seconds), title="time of each stage"))
+    console.print(f"to look at: {output / REPORT}, {output / VIDEO}", highlight=False, soft_wrap=True)
 
 
 def _score_rows(result: SegmentResult) -> list[tuple[str, Scores]]:

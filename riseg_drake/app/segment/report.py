@@ -46,6 +46,7 @@ class Album:
 
     def page(
         self,
+        title: str,
         summary: Mapping[str, Any],
         rows: Sequence[tuple[str, Scores]],
         stages: Mapping[str, Mapping[str, float]],
@@ -63,7 +64,7 @@ class Album:
             facts.append(("took", f"{summary['seconds']:.0f} s"))
         return report_html(
             Report(
-                title=f"{summary.get('recording', 'a recording')}, segmented",
+                title=title,
                 facts=[*told_facts(), *facts],
                 ending=f"{str(summary['state']).capitalize()}: {summary['end']}.",
                 views=self._views,

@@ -5,7 +5,7 @@ from riseg_drake.app.segment.report import Album
 from riseg_drake.recording.layout import RecordedFrame
 from riseg_drake.segmentation.segmentation import Segmentation
 
-SUMMARY = {"recording": "mine", "seed": 3, "state": "done", "end": "all frames were read"}
+SUMMARY = {"seed": 3, "state": "done", "end": "all frames were read"}
 
 
 def known(ids):
@@ -21,7 +21,7 @@ def page_of(*seen):
     for k, ids in enumerate(seen):
         color = np.full((24, 32, 3), 7 * k % 250, np.uint8)
         album.look(RecordedFrame(10.0 + k, color, np.ones((24, 32), np.float32)), known(ids))
-    return album.page(SUMMARY, [], {})
+    return album.page("mine", SUMMARY, [], {})
 
 
 def test_it_shows_the_first_frame_each_change_of_what_is_known_and_the_last_frame():
@@ -43,5 +43,5 @@ def test_a_long_recording_has_a_short_report_with_its_first_and_its_last_frame()
 
 
 def test_a_recording_of_which_nothing_was_read_has_a_page_that_says_so():
-    page = Album().page({**SUMMARY, "state": "failed", "end": "no frame shows a table"}, [], {})
+    page = Album().page("mine", {**SUMMARY, "state": "failed", "end": "no frame shows a table"}, [], {})
     assert "Failed: no frame shows a table." in page
