@@ -1,10 +1,10 @@
-"""Makes riseg_drake/recording/sample, which `riseg segment` takes by itself, from a recorded run of its own scene.
+"""Makes riseg_drake/recording/sample, which `riseg segment` takes by itself, from a recorded run of its scene.
 
     riseg run riseg_drake/recording/sample/scenario.yaml --seed 7 --record --output out/sample
     python -m tests.recording.make_sample out/sample/recording riseg_drake/recording/sample
 
-Fewer frames, and smaller files: colour becomes JPEG; poses and robot masks are left out, for they follow from the
-joint angles. The scenario stays as it is: it holds what differs from the built-in one, and no more.
+Fewer frames, and smaller files: colour becomes JPEG; poses and robot masks are left out, for they follow from
+the joint angles. The scenario stays as it is: it holds what differs from the built-in one, and no more.
 """
 
 import shutil

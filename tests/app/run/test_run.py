@@ -53,7 +53,7 @@ def test_a_run_leaves_a_report_of_its_interaction_with_the_figures_of_its_summar
     assert page.count('<section class="moment">') == 1
     assert f"Done: {content['end']}." in html.unescape(page)
     for step in content["steps"]:
-        assert f"Overlap F {100 * step['scores']['overlap_f']:.1f} %" in page
+        assert f"Overlap F {100 * step['scores']['Objects F-measure']:.1f} %" in page
     for sure in content["steps"][1]["confidence"].values():
         assert f'value="{sure:.3f}"' in page
 

@@ -22,9 +22,7 @@ def test_the_sample_is_small_and_a_whole_recording_with_labels():
 
 
 @pytest.mark.renders
-def test_without_a_recording_the_sample_is_segmented_and_its_three_toys_are_found(
-    tmp_path, monkeypatch, capsys
-):
+def test_without_a_recording_the_three_toys_of_the_sample_are_found(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["segment"]) == 0
     output = tmp_path / "out" / "segment_sample"
