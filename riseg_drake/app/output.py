@@ -1,8 +1,7 @@
 """The folder a run leaves behind: pictures and masks of every step, and a summary of them all.
 
     summary.json
-    step_0/ color.png  depth.png  mask.png  mask_color.png  untouched.png  overlay.png  ground_truth.png
-            refined.png
+    step_0/ color.png  depth.png  mask.png  mask_color.png  untouched.png  overlay.png  ground_truth.png  ...
     step_1/ ...
     report.html
 

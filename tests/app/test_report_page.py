@@ -1,12 +1,17 @@
 import base64
 import re
+import shutil
+import subprocess
 from html.parser import HTMLParser
 
 import cv2
 import numpy as np
+import pytest
 
 from riseg_drake.app.report_page import Moment, Report, Table, found_objects, report_html, view
 from riseg_drake.pictures.masks import draw_masks
+
+CHROMIUM = shutil.which("chromium")
 
 
 def made(**other):
@@ -97,3 +102,29 @@ def test_the_least_sure_object_comes_first_and_is_marked():
 def test_a_run_that_saw_nothing_has_a_page_too():
     page, _ = made(views=[], moments=[], objects=[], tables=[])
     assert "No object was found." in page
+
+
+TRY = """<script>
+const slider = document.querySelector('input'), layer = document.querySelectorAll('.view div')[1];
+const shown = [1, 0.5, 0].map(value => {
+  slider.value = value; slider.dispatchEvent(new Event('input')); return getComputedStyle(layer).opacity;
+});
+const box = document.querySelector('.view').getBoundingClientRect();
+const fits = document.body.scrollWidth <= innerWidth;
+document.title = [...shown, (box.width / box.height).toFixed(2), fits].join(' ');
+</script></body>"""
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium here to open the page in; apt install chromium")
+@pytest.mark.renders
+@pytest.mark.parametrize("width", [1400, 400])
+def test_in_a_browser_the_slider_fades_the_masks_and_nothing_is_wrong(tmp_path, width):
+    page, _ = made()
+    (tmp_path / "page.html").write_text(page.replace("</body>", TRY))
+    options = ("--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--dump-dom")
+    page_url = (tmp_path / "page.html").as_uri()
+    opened = subprocess.run(
+        [CHROMIUM, *options, f"--window-size={width},900", page_url], capture_output=True, text=True, check=True
+    )
+    assert "<title>1 0.5 0 1.33 true</title>" in opened.stdout
+    assert "CONSOLE" not in opened.stderr
