@@ -2,28 +2,20 @@
 
 import argparse
 from pathlib import Path
-from typing import NoReturn
 
 from riseg_drake.app import commands
 from riseg_drake.app.export_options import add_export
+from riseg_drake.app.package import package_version
+from riseg_drake.app.parser import Parser
 from riseg_drake.app.source_options import add_source_options
-
-BAD_INPUT = 2
-"""Exit code."""
-
-
-class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line."""
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
 
 
 def command_line() -> argparse.ArgumentParser:
     """The parser of all commands; what it returns has the chosen command's function as `call`."""
-    parser = _Parser(
+    parser = Parser(
         prog="riseg", description="Find the objects on a table by nudging them (rt-RISeg in Drake)."
     )
+    parser.add_argument("--version", action="version", version=f"riseg {package_version()}")
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
     run = _add(
@@ -181,7 +173,13 @@ def command_line() -> argparse.ArgumentParser:
         "Find the objects of a recording, without a robot: masks, a video, and scores where there are labels.\n"
         "A recording is a ROS bag, or a folder of images with a camera.json, see docs/recordings.md.",
     )
-    segment.add_argument("recording", type=Path, metavar="RECORDING", help="its folder, or the file of a bag")
+    segment.add_argument(
+        "recording",
+        type=Path,
+        nargs="?",
+        metavar="RECORDING",
+        help="its folder, or the file of a bag (the sample that ships with the package)",
+    )
     segment.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/segment_NAME)")
     _add_overwrite(segment, "segmentation")
     segment.add_argument(
@@ -268,6 +266,21 @@ def command_line() -> argparse.ArgumentParser:
     bench.add_argument("--raft", action="store_true", help="measure RAFT instead, small and large")
     bench.add_argument(
         "--sam", action="store_true", help="measure Segment Anything instead, and the frames beside it"
+    )
+
+    doctor = _add(
+        subparsers,
+        "doctor",
+        commands.doctor,
+        "Say what this machine and this installation can do, each with its remedy where it lacks something.\n"
+        "Ends with 1 where something is missing that simulating and segmenting need.",
+    )
+    doctor.add_argument(
+        "scenario",
+        type=Path,
+        nargs="?",
+        metavar="SCENARIO",
+        help="a YAML file, for its LCM network and channels (the built-in hardware.yaml)",
     )
 
     diagram = _add(

@@ -7,23 +7,25 @@ from collections.abc import Sequence
 from rich.console import Console
 
 from riseg_drake.app import commands
-from riseg_drake.app.arguments import BAD_INPUT, command_line
+from riseg_drake.app.arguments import command_line
+from riseg_drake.app.parser import BAD_INPUT
 from riseg_drake.host.processes import Stop, stopped_by_signals
 from riseg_drake.host.terminal import can_write, drop_output, nobody_reads, tell_error
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns its exit code: 0 done, 2 bad input or not done, 128 and the signal's number when
-    stopped."""
+    """Run one command; returns its exit code: 0 done, 1 a doctor's that something lacks, 2 bad input or not
+    done, 128 and the signal's number when stopped."""
     chosen = command_line().parse_args(arguments)
     # Before numpy is imported: on matrices of six by six the threads of linear algebra only wait for each
     # other, and sums that they share come out differently in their last bits.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Of a library that only evaluations with several jobs use, and these say it themselves.
     warnings.filterwarnings("ignore", message=".*joblib will operate in serial mode", category=UserWarning)
+    code = 0
     with stopped_by_signals(commands.__file__) as stop:
         try:
-            chosen.call(chosen, Console(markup=False))  # what is said may hold anybody's brackets
+            code = chosen.call(chosen, Console(markup=False)) or 0  # what is said may hold anybody's brackets
         except KeyboardInterrupt as interrupt:
             return _stopped(stop, f"stopped; {interrupt}" if str(interrupt) else "stopped")
         except BrokenPipeError:
@@ -41,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             can_write()
         except OSError as error:
             return _refused(error)
-    return 0
+    return code
 
 
 def _stopped(stop: Stop, words: str) -> int:

@@ -117,6 +117,13 @@ def bench(chosen: argparse.Namespace, console: Console) -> None:
     bench_command(chosen.scenario, chosen.seed, chosen.stream, chosen.sam, console)
 
 
+def doctor(chosen: argparse.Namespace, console: Console) -> int:
+    """`riseg doctor`; returns its exit code."""
+    from riseg_drake.app.doctor.command import doctor_command
+
+    return doctor_command(chosen.scenario, console)
+
+
 def diagram(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg diagram`."""
     from riseg_drake.app.show.drawing import diagram_command

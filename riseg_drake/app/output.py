@@ -1,8 +1,9 @@
 """The folder a run leaves behind: pictures and masks of every step, and a summary of them all.
 
     summary.json
-    step_0/ color.png  depth.png  mask.png  untouched.png  overlay.png  ground_truth.png  refined.png
+    step_0/ color.png  depth.png  mask.png  mask_color.png  untouched.png  overlay.png  ground_truth.png  ...
     step_1/ ...
+    report.html
 
 `refined.png` is there with a SAM, `ground_truth.png` where the truth is known. Whenever the run is
 stopped, every step that the summary lists is there, and whole.
@@ -19,17 +20,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.app.output_folder import OutputFolder
+from riseg_drake.app.report_page import REPORT
 from riseg_drake.evaluation.disturbance import Disturbance
 from riseg_drake.evaluation.in_motion import InMotion
 from riseg_drake.evaluation.scores import Scores
 from riseg_drake.host.processes import undisturbed
 from riseg_drake.pictures.masks import draw_masks
-from riseg_drake.recording.whole_file import write_png
+from riseg_drake.pictures.object_colors import object_colors
+from riseg_drake.recording.whole_file import write_png, write_text
 from riseg_drake.recording.writer import depth_to_millimetres
 
 RECORDING = "recording"
 REPLAY = "replay.html"
-PARTS = rf"\.?step_\d+(\.unfinished)?|{RECORDING}|export|{re.escape(REPLAY)}"
+PARTS = rf"\.?step_\d+(\.unfinished)?|{RECORDING}|export|{re.escape(REPLAY)}|{re.escape(REPORT)}"
 """What a run puts into its folder, beside the summary."""
 
 
@@ -96,6 +99,7 @@ class RunFolder:
                 write_png(unfinished / "color.png", step.color)
                 write_png(unfinished / "depth.png", depth_to_millimetres(step.depth))
                 write_png(unfinished / "mask.png", step.mask.astype(np.uint16))
+                write_png(unfinished / "mask_color.png", object_colors(step.mask))
                 if step.untouched is not None:
                     write_png(unfinished / "untouched.png", step.untouched)
                 write_png(
@@ -123,6 +127,16 @@ class RunFolder:
     def note(self, **entries: Any) -> None:
         """Enter something about the whole run."""
         self._folder.note(**entries)
+
+    @property
+    def summary(self) -> Mapping[str, Any]:
+        """What is entered so far."""
+        return self._folder.summary
+
+    def write_report(self, page: str) -> None:
+        """Write the report, as HTML."""
+        with self._folder.writing(), undisturbed():
+            write_text(self.path / REPORT, page)
 
     def close(self) -> None:
         """Let others write there."""

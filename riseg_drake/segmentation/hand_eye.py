@@ -22,6 +22,9 @@ SPAN = (4.0, 25.0)
 TEXTURE = 8.0
 """Least gray-value gradient, 1/pixel, of a pixel at which optical flow is believed."""
 
+EXPECTED, OBSERVED = (40, 90, 220), (240, 130, 20)
+"""Colours of the arrows: blue and orange."""
+
 
 @dataclass(frozen=True)
 class FlowError:
@@ -77,16 +80,20 @@ def verdict(errors: Sequence[FlowError]) -> tuple[float, str]:
 
 
 def draw_flow_error(error: FlowError, step: int = 32, scale: float = 2.0) -> NDArray[np.uint8]:
-    """The picture [H, W, 3] with expected (blue) and observed (orange) flow as arrows `scale` times as long."""
+    """The picture [H, W, 3] with expected (blue) and observed (orange) flow as arrows `scale` times as long.
+
+    Expected flow is drawn broad and observed flow thin upon it: where they agree both are seen.
+    """
     picture = error.pair.reference.color.copy()
     height, width = error.usable.shape
     for v in range(step // 2, height, step):
         for u in range(step // 2, width, step):
             if not error.usable[v, u]:
                 continue
-            for flow, color in ((error.expected, (40, 90, 220)), (error.observed, (240, 130, 20))):
+            for flow, color, line in ((error.expected, EXPECTED, 6), (error.observed, OBSERVED, 2)):
                 du, dv = scale * flow[v, u]
-                cv2.arrowedLine(picture, (u, v), (round(u + du), round(v + dv)), color, 2, tipLength=0.3)
+                tip = (round(u + du), round(v + dv))
+                cv2.arrowedLine(picture, (u, v), tip, color, line, cv2.LINE_AA, tipLength=0.3)
     return picture
 
 

@@ -7,6 +7,7 @@ import pytest
 from riseg_drake.app.output import RunFolder, Step, stage_figures
 from riseg_drake.app.output_folder import OutputError
 from riseg_drake.evaluation.scores import FIGURES, score
+from riseg_drake.pictures.object_colors import object_colors
 
 
 def step(number):
@@ -43,6 +44,8 @@ def test_a_step_is_written_in_the_form_that_was_promised(tmp_path):
     folder = tmp_path / "run" / "step_0"
     np.testing.assert_array_equal(read(folder / "color.png"), written.color[..., ::-1])
     np.testing.assert_array_equal(read(folder / "mask.png"), written.mask)
+    colored = read(folder / "mask_color.png")[..., ::-1]
+    np.testing.assert_array_equal(colored, object_colors(written.mask))
     np.testing.assert_array_equal(read(folder / "untouched.png"), written.untouched)
     np.testing.assert_array_equal(read(folder / "ground_truth.png"), written.mask)
     depth = read(folder / "depth.png")

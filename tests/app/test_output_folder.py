@@ -4,7 +4,6 @@ import errno
 import json
 import shutil
 
-import cv2
 import numpy as np
 import pytest
 
@@ -13,6 +12,7 @@ from riseg_drake.app.cli import main
 from riseg_drake.app.output import RunFolder
 from riseg_drake.app.output_folder import OutputError, OutputFolder
 from riseg_drake.app.segment.folder import SegmentFolder
+from riseg_drake.pictures.video import VideoWriter
 from riseg_drake.recording import whole_file
 from riseg_drake.recording.whole_file import GrowingText
 from tests.app.test_output import step
@@ -189,20 +189,17 @@ def test_a_place_where_nothing_can_be_written_is_named(tmp_path, capsys):
 
 def test_a_video_that_is_not_whole_ends_a_segmentation_instead_of_being_left_out(tmp_path, monkeypatch):
     with SegmentFolder(tmp_path / "out", 10.0, {}) as folder:
-        folder.write("1.png", np.zeros((20, 30, 3), np.uint8), np.zeros((20, 30), np.uint16), {}, None)
-        # What OpenCV leaves of it, without a word, where there is no room for more.
+        color, mask = np.zeros((20, 30, 3), np.uint8), np.zeros((20, 30), np.uint16)
+        folder.write("1.png", color, mask, {}, None, 0.0, 1.0)
+        # What an encoder leaves of it where there is no room for more.
         video = tmp_path / "out" / ".overlay.unfinished.mp4"
-        release = cv2.VideoWriter.release
+        close = VideoWriter.close
 
-        class Cut:
-            def __init__(self, writer):
-                self.writer = writer
+        def cut(self):
+            close(self)
+            video.write_bytes(video.read_bytes()[:40])
 
-            def release(self):
-                release(self.writer)
-                video.write_bytes(video.read_bytes()[:40])
-
-        monkeypatch.setattr(folder, "_video", Cut(folder._video))
+        monkeypatch.setattr(VideoWriter, "close", cut)
         with pytest.raises(OutputError, match=r"overlay\.mp4: it could not be written whole: No space left"):
             folder.finish()
     assert not list((tmp_path / "out").glob("*.mp4"))

@@ -82,6 +82,7 @@ EXECUTED: dict[str, tuple[Callable[[list[str]], list[str] | None], str]] = {
     ),
     "score": (lambda words: words, "executed as it stands"),
     "diagram": (lambda words: words, "executed as it stands"),
+    "doctor": (lambda words: words, "executed as it stands"),
     "bench": (lambda words: None, "measures for a minute; tests/app/bench/test_stop_bench.py has its parts"),
     "emulate": (
         lambda words: None,

@@ -207,6 +207,8 @@ def test_the_nearest_time_is_the_one_least_apart(time, nearest):
 def test_a_name_may_hold_spaces(file):
     ((entry,), _) = read_file_list(file("0.5  rgb/my first image.png  \n"))
     assert (entry.time, entry.name) == (0.5, "rgb/my first image.png")
+
+
 def test_a_row_that_nobody_knew_is_left_out_and_the_others_stay(file):
     """Trackers that have lost their way write nan; a whole recording shall not be lost with it."""
     path = file("0.0 1 2", "0.1 nan nan", "0.2 3 -NaN", "0.3 5 6")

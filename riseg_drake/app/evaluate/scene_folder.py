@@ -2,6 +2,7 @@
 
 scene_003/
     summary.json  step_0/ ... step_5/    as `riseg run` leaves them
+    report.html                          the same, to be looked at
     recording/                           with an ablation
     baselines.json  ablation.json        scores of other methods, of other versions
 """

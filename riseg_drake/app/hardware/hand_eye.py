@@ -63,7 +63,7 @@ def hand_eye_command(
                 write_png(folder.path / f"flow_{index}.png", draw_flow_error(error))
         plane_W = objects_above_table(frames[-1], scenario.above_table).plane_W
         folder.note(state="done", **_told(errors, plane_W, console))
-    console.print(f"arrows of both flows in {folder.path}: expected blue, observed orange")
+    console.print(f"arrows of both flows in {folder.path}: expected broad and blue, observed orange upon it")
 
 
 def _told(errors: Sequence[FlowError], plane_W: NDArray, console: Console) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """`riseg run`: one scene from the first look to the last push."""
 
 import resource
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, replace
@@ -17,9 +16,11 @@ from rich.status import Status
 from riseg_drake.app.diagram import WiredDiagram, make_diagram
 from riseg_drake.app.exports import Exports, exporting
 from riseg_drake.app.graphics import require_graphics
-from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step, stage_figures
+from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step
+from riseg_drake.app.report_page import REPORT
 from riseg_drake.app.run.interactions import Listener, Progress, interactions, simulated_truth
 from riseg_drake.app.run.recording import recording_of
+from riseg_drake.app.run.report import pooled_stages, run_report
 from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
 from riseg_drake.app.tables import score_table, stage_table
 from riseg_drake.app.work_state import end_noted
@@ -67,6 +68,7 @@ def run_command(request: RunRequest, console: Console) -> None:
             steps = run(scenario, seed, folder, request.record, browser, Narrator(console, status), exports)
     report(steps, console)
     exports.tell(console)
+    console.print(f"to look at: {path / REPORT}", highlight=False, soft_wrap=True)
 
 
 def run(
@@ -190,6 +192,7 @@ def state_of(folder: RunFolder, progress: Progress, steps: list[Step]) -> Iterat
             frames=progress.frames,
             peak_memory_mb=peak_memory_mb(),
         )
+        folder.write_report(run_report(folder.summary, steps))
 
     def left() -> str:
         return f"{len(steps)} finished step{'' if len(steps) == 1 else 's'} in {folder.path}"
@@ -254,8 +257,4 @@ def report(steps: list[Step], console: Console) -> None:
         console.print("\nscores in percent, after each interaction")
         moved = {str(s.interaction_step): s.in_motion.overlap_f for s in steps if s.in_motion is not None}
         console.print(score_table(rows, first="\nstep", in_motion=moved))
-    seconds: dict[str, list[float]] = defaultdict(list)
-    for step in steps:
-        for stage, times in step.stage_seconds.items():
-            seconds[stage].extend(times)
-    console.print(stage_table(stage_figures(seconds), title="time of each stage"))
+    console.print(stage_table(pooled_stages(steps), title="time of each stage"))

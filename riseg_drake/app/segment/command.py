@@ -5,6 +5,7 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, astuple, dataclass, field
+from importlib.resources import files
 from pathlib import Path
 from time import perf_counter
 
@@ -15,12 +16,14 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from riseg_drake.app.exports import Exports, exporting
 from riseg_drake.app.output import RECORDING, confidence_figures, stage_figures
+from riseg_drake.app.report_page import REPORT
 from riseg_drake.app.run.command import peak_memory_mb
 from riseg_drake.app.scenario import Scenario, load_scenario
 from riseg_drake.app.segment.doubts import frames_with, recording_doubts
-from riseg_drake.app.segment.folder import SegmentFolder
+from riseg_drake.app.segment.folder import VIDEO, SegmentFolder
 from riseg_drake.app.segment.recorded_view import RecordedView, recorded_view
 from riseg_drake.app.segment.replay import Replay
+from riseg_drake.app.segment.report import Album
 from riseg_drake.app.tables import score_table, stage_table
 from riseg_drake.app.work_state import end_noted
 from riseg_drake.evaluation.scores import FIGURES, Scores, score
@@ -40,11 +43,15 @@ MOST_TIMES = 10_000
 """Calls of each stage whose time is kept: a recording may be longer than memory."""
 
 
+SAMPLE = Path(str(files("riseg_drake.recording") / "sample"))
+"""A recorded run of three toys that ships with the package; tests/recording/make_sample.py made it."""
+
+
 @dataclass(frozen=True)
 class SegmentRequest:
     """What a person asks of `riseg segment`."""
 
-    recording: Path
+    recording: Path = SAMPLE
     output: Path | None = None
     scenario: Path | None = None
     """Parameters; those of the recorded run, or the built-in ones, if None."""
@@ -90,6 +97,10 @@ class SegmentResult:
     """[10], of the ten figures over them."""
     left_out: list[LeftOut] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    start: float = 0.0
+    """Time stamp of the first frame, s."""
+    album: Album = field(default_factory=Album)
+    """What the report shows."""
 
     @property
     def mean(self) -> Scores:
@@ -136,7 +147,8 @@ def segment_command(request: SegmentRequest, console: Console) -> None:
         _state_of(folder, result, clock),
         exporting(exports, folder.note),
     ):
-        console.print(f"{len(reader)} frames of {request.recording}, results in {output}", highlight=False)
+        what = "the sample recording" if request.recording == SAMPLE else request.recording
+        console.print(f"{len(reader)} frames of {what}, results in {output}", highlight=False)
         console.print(f"camera poses: {view.camera_poses}; robot pixels: {view.robot_pixels}", highlight=False)
         console.print(
             "frames with " + ", ".join(f"{name}: {number}" for name, number in having.items()), highlight=False
@@ -161,9 +173,14 @@ def _segment(
     told = _Told(console)
     told.tell(view.warnings)
     with Progress(
-        TextColumn("frames"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console
+        TextColumn("frames"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]}"),
+        TimeRemainingColumn(),
+        console=console,
     ) as progress:
-        bar = progress.add_task("frames", total=len(reader))
+        bar, start = progress.add_task("frames", total=len(reader), rate=""), perf_counter()
         for frame in reader:
             if _take(frame, reader, replay, folder, result):
                 exports.take(replay.segmentation, frame.name)
@@ -171,7 +188,9 @@ def _segment(
             told.tell([*result.warnings, *map(str, result.left_out)])
             for times in clock.seconds.values():
                 del times[:-MOST_TIMES]
-            progress.update(bar, completed=min(result.frames + len(result.left_out), len(reader)))
+            taken = result.frames + len(result.left_out)
+            rate = f"{taken / (perf_counter() - start):.1f} frames/s"
+            progress.update(bar, completed=min(taken, len(reader)), rate=rate)
         told.tell([*result.warnings, *map(str, result.left_out)])
         progress.update(bar, completed=len(reader))
     if result.frames == 0:
@@ -195,8 +214,13 @@ def _take(
         result.sums += astuple(scores)
         result.scored += 1
     segmentation = replay.segmentation
-    folder.write(frame.name, frame.color, mask, segmentation.confidence, scores)
+    if result.frames == 0:
+        result.start = frame.time
     result.frames += 1
+    share = (result.frames + len(result.left_out)) / len(reader)
+    time = frame.time - result.start
+    folder.write(frame.name, frame.color, mask, segmentation.confidence, scores, time, share)
+    result.album.look(frame, segmentation)
     result.object_ids, result.confidence = segmentation.object_ids, segmentation.confidence
     return True
 
@@ -280,6 +304,9 @@ def _state_of(folder: SegmentFolder, result: SegmentResult, clock: StageClock) -
             seconds=round(perf_counter() - start, 2),
             peak_memory_mb=peak_memory_mb(),
         )
+        title = f"{_recording_name(Path(folder.summary['recording']))}, segmented"
+        stages = stage_figures(clock.seconds)
+        folder.write_report(result.album.page(title, folder.summary, _score_rows(result), stages))
 
     with end_noted(finish, lambda: f"{_masks(result.frames)} in {folder.path}"):
         yield
@@ -295,9 +322,15 @@ def _report(result: SegmentResult, clock: StageClock, output: Path, console: Con
     )
     if result.last is not None:
         console.print("\nscores in percent")
-        rows = [(f"mean of {result.scored}", result.mean), ("last", result.last)]
-        console.print(score_table(rows, first="\nframes"))
+        console.print(score_table(_score_rows(result), first="\nframes"))
     console.print(stage_table(stage_figures(clock.seconds), title="time of each stage"))
+    console.print(f"to look at: {output / REPORT}, {output / VIDEO}", highlight=False, soft_wrap=True)
+
+
+def _score_rows(result: SegmentResult) -> list[tuple[str, Scores]]:
+    if result.last is None:
+        return []
+    return [(f"mean of {result.scored}", result.mean), ("last", result.last)]
 
 
 def _masks(number: int) -> str:

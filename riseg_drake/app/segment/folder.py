@@ -3,7 +3,8 @@
     summary.json            how it went, what was left out, and the scores where there are true labels
     mask/                   L_t of every frame, 16 bit PNG, named as the colour image it belongs to
     untouched.png           of the last frame what has not moved yet, as clusters of depth: guessed, and no ids
-    overlay.mp4             every frame with its objects tinted and numbered
+    overlay.mp4             every frame with its objects tinted and numbered, the time and a bar of it
+    report.html             what was run, what was seen before and after each change, scores, doubts and times
     scores.csv              the ten figures of every frame with a true label
     export/                 the same in the formats of other tools, where that was asked for
 
@@ -19,16 +20,17 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.app.exports import EXPORT
 from riseg_drake.app.output_folder import OutputError, OutputFolder
+from riseg_drake.app.report_page import REPORT
 from riseg_drake.evaluation.scores import Scores
 from riseg_drake.host.processes import undisturbed
 from riseg_drake.pictures.masks import draw_masks
-from riseg_drake.recording.whole_file import GrowingText, write_png
+from riseg_drake.pictures.video import VideoWriter, with_time
+from riseg_drake.recording.whole_file import GrowingText, write_png, write_text
 
 MASKS = "mask"
 UNTOUCHED = "untouched.png"
@@ -37,8 +39,8 @@ SCORES = "scores.csv"
 COMMAND = "segment"
 LONGEST_NAME = 50
 """Characters of a mask's name: as many bytes as any file system takes, whatever they are."""
-_UNFINISHED_VIDEO = ".overlay.unfinished.mp4"  # OpenCV goes by the ending
-PARTS = "|".join(map(re.escape, (MASKS, UNTOUCHED, VIDEO, SCORES, EXPORT, _UNFINISHED_VIDEO)))
+_UNFINISHED_VIDEO = ".overlay.unfinished.mp4"
+PARTS = "|".join(map(re.escape, (MASKS, UNTOUCHED, VIDEO, SCORES, REPORT, EXPORT, _UNFINISHED_VIDEO)))
 """What a segmentation puts into its folder, beside the summary."""
 
 
@@ -52,7 +54,7 @@ class SegmentFolder:
     def __init__(self, folder: Path, rate: float, about: Mapping[str, Any], *, overwrite: bool = False):
         self.path = folder
         self._rate = rate
-        self._video: cv2.VideoWriter | None = None
+        self._video: VideoWriter | None = None
         self._scores: GrowingText | None = None
         self._names: set[str] = set()
         self._folder = OutputFolder(folder, COMMAND, PARTS, {**about, "state": "running"}, overwrite=overwrite)
@@ -66,10 +68,13 @@ class SegmentFolder:
         mask: NDArray[np.uint16],
         confidence: Mapping[int, float],
         scores: Scores | None,
+        time: float,
+        share: float,
     ) -> None:
         """Write what belongs to one frame, colour [H, W, 3] and mask [H, W]; `name` is its colour image's.
 
-        The video shows the confidence of each id, too.
+        The video shows the confidence of each id, too, the time of the frame since the first one, s, and which
+        share of the recording has passed with it.
 
         Raises OutputError where the disk is full or the folder has gone.
         """
@@ -78,12 +83,22 @@ class SegmentFolder:
             write_png(self.path / MASKS / file, mask.astype(np.uint16))
             if scores is not None:
                 self._write_scores(file, scores)
-        self._show(draw_masks(color, mask, confidence=confidence))
+            self._show(with_time(draw_masks(color, mask, confidence=confidence), time, share))
 
     def write_untouched(self, clusters: NDArray[np.uint16]) -> None:
         """Write what the last frame shows that has not moved yet, [H, W]."""
         with self._folder.writing():
             write_png(self.path / UNTOUCHED, clusters)
+
+    @property
+    def summary(self) -> Mapping[str, Any]:
+        """What is entered so far."""
+        return self._folder.summary
+
+    def write_report(self, page: str) -> None:
+        """Write the report, as HTML."""
+        with self._folder.writing(), undisturbed():
+            write_text(self.path / REPORT, page)
 
     def note(self, **entries: Any) -> None:
         """Enter something in the summary."""
@@ -121,8 +136,9 @@ class SegmentFolder:
         """Close the video; where not all of it could be written, there is none, and the answer is no."""
         if self._video is None:
             return True
-        self._video.release()
-        self._video = None
+        video, self._video = self._video, None
+        with suppress(OSError):  # what is left of it is looked at
+            video.close()
         unfinished = self.path / _UNFINISHED_VIDEO
         if not _is_whole_video(unfinished):
             unfinished.unlink(missing_ok=True)
@@ -150,17 +166,13 @@ class SegmentFolder:
     def _show(self, picture: NDArray[np.uint8]) -> None:
         height, width = picture.shape[:2]
         if self._video is None:
-            code = cv2.VideoWriter.fourcc(*"mp4v")
             rate = min(max(self._rate, 1.0), 120.0)
-            file = str(self.path / _UNFINISHED_VIDEO)
-            # The codec wants even sizes.
-            self._video = cv2.VideoWriter(file, code, rate, (width + width % 2, height + height % 2))
-        bgr = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
-        self._video.write(cv2.copyMakeBorder(bgr, 0, height % 2, 0, width % 2, cv2.BORDER_REPLICATE))
+            self._video = VideoWriter(self.path / _UNFINISHED_VIDEO, rate, (height, width))
+        self._video.append(picture)
 
 
 def _is_whole_video(path: Path) -> bool:
-    """Whether an MP4 file is there with all its boxes, the index (moov) among them; OpenCV never says."""
+    """Whether an MP4 file is there with all its boxes, the index (moov) among them."""
     if not path.exists():
         return False
     found, start, size = set(), 0, path.stat().st_size

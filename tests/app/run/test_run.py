@@ -1,3 +1,4 @@
+import html
 import json
 import re
 
@@ -43,8 +44,19 @@ def test_a_run_ends_by_itself_and_leaves_a_step_for_every_interaction(finished):
     assert content["ended"] in ("enough_interactions", "nothing_left")
     for i in (0, 1):
         names = {path.name for path in (finished / f"step_{i}").iterdir()}
-        pictures = ("color", "depth", "mask", "untouched", "overlay", "ground_truth")
+        pictures = ("color", "depth", "mask", "mask_color", "untouched", "overlay", "ground_truth")
         assert names == {f"{picture}.png" for picture in pictures}
+
+
+def test_a_run_leaves_a_report_of_its_interaction_with_the_figures_of_its_summary(finished):
+    page = (finished / "report.html").read_text()
+    content = summary(finished)
+    assert page.count('<section class="moment">') == 1
+    assert f"Done: {content['end']}." in html.unescape(page)
+    for step in content["steps"]:
+        assert f"Overlap F {100 * step['scores']['Objects F-measure']:.1f} %" in page
+    for sure in content["steps"][1]["confidence"].values():
+        assert f'value="{sure:.3f}"' in page
 
 
 def test_the_area_that_is_left_at_the_end_is_that_of_what_is_not_segmented(finished):
@@ -165,6 +177,7 @@ def test_a_run_that_is_stopped_leaves_whole_steps_and_exit_code_130(
     assert main(["run", str(small_scenario), "--record", "--output", str(tmp_path / "out")]) == 130
     content = summary(tmp_path / "out")
     assert content["state"] == "interrupted"
+    assert "Before any push" in (tmp_path / "out" / "report.html").read_text()
     assert [step["step"] for step in content["steps"]] == [0]
     assert not list((tmp_path / "out").rglob("*.unfinished"))
     assert len(list(RecordingReader(tmp_path / "out" / "recording"))) in (19, 20)

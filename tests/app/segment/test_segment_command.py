@@ -51,6 +51,7 @@ def test_every_frame_gets_a_mask_and_a_place_in_the_video_and_a_score(recording)
     assert np.count_nonzero(last & truth) / np.count_nonzero(last | truth) > 0.8
     video = cv2.VideoCapture(str(output / "overlay.mp4"))
     assert int(video.get(cv2.CAP_PROP_FRAME_COUNT)) == 8
+    assert "Done: all frames were read." in (output / "report.html").read_text()
     assert summary["state"] == "done"
     assert (summary["frames"], summary["objects"], summary["left_out"]) == (8, 1, [])
     assert len((output / "scores.csv").read_text().splitlines()) == 9
@@ -145,7 +146,8 @@ def test_ctrl_c_leaves_whole_files_and_a_summary(recording, monkeypatch, capsys)
     assert (summary["state"], summary["frames"]) == ("interrupted", 3)
     assert len(masks(output)) == 3
     assert int(cv2.VideoCapture(str(output / "overlay.mp4")).get(cv2.CAP_PROP_FRAME_COUNT)) == 3
-    assert {path.name for path in output.iterdir()} == {"summary.json", "mask", "overlay.mp4", "scores.csv"}
+    left = {"summary.json", "mask", "overlay.mp4", "scores.csv", "report.html"}
+    assert {path.name for path in output.iterdir()} == left
 
 
 def test_an_output_folder_with_other_things_is_left_alone(recording, capsys):

@@ -1,0 +1,1 @@
+"""The machine and what is installed, looked over: `riseg doctor`."""
