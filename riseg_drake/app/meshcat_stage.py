@@ -10,13 +10,13 @@ from pydrake.math import RigidTransform, RotationMatrix
 # All from the middle of the work area on the table, m: x away from the robot, z up.
 EYE = np.array([0.72, 0.0, 0.66])
 """In front of the robot and above it."""
-TARGET = np.array([0.075, 0.0, 0.02])
+TARGET = np.array([0.09, 0.0, 0.02])
 FIELD_OF_VIEW = 40.0
 """Vertical, degrees: a longer lens than Meshcat's own, which makes near things large and far ones small."""
-PANEL = np.array([0.275, 0.0, 0.08])
+PANEL = np.array([0.352, 0.0, 0.12])
 """The middle of the camera's picture, in front of the work area, where the arm is never between."""
-PANEL_WIDTH = 0.22  # m
-LABEL_HEIGHT = 0.011  # m
+PANEL_WIDTH = 0.198  # m
+LABEL_HEIGHT = 0.014  # m
 LABEL_LIFT = 0.02
 """From the top of an object to the middle of its label, m."""
 TOP_COLOR, BOTTOM_COLOR = (0.86, 0.89, 0.92), (0.66, 0.70, 0.74)

@@ -31,6 +31,7 @@ from riseg_drake.geometry.camera import Intrinsics, back_project
 from riseg_drake.geometry.rgbd import NO_PAIR, Frame, FramePair
 from riseg_drake.pictures.cards import set_card, text_card, with_caption
 from riseg_drake.pictures.masks import draw_masks
+from riseg_drake.pictures.object_colors import object_colors
 from riseg_drake.pushing.arm_path import ArmPhase
 from riseg_drake.pushing.push import NO_PUSH, Push
 from riseg_drake.pushing.pusher import Pusher
@@ -38,9 +39,15 @@ from riseg_drake.segmentation.segmentation import Segmentation, nothing_segmente
 
 POINT_STRIDE = 3
 """Every third pixel in both directions becomes a point: 34 thousand at 640x480."""
-POINT_SIZE = 0.004  # m
+POINT_SIZE = 0.010
+"""Meshcat draws points as wide as that under a field of view of 90 degrees, m; through a longer lens they are
+the smaller for it: 4 mm here."""
 POINT_LIFT = 0.006
 """How far above a thing its points are drawn, m: within its mesh half of them would be hidden."""
+TINT = 0.7
+"""How much of an object's colour lies over its points; the rest is how bright the camera sees them."""
+GAMMA = 2.2
+"""Of the camera's pictures."""
 PICTURE_RATE = 3.0
 """How often the picture is renewed, 1/s."""
 PICTURE_WIDTH = 400
@@ -80,7 +87,8 @@ class Points:
         cloud = PointCloud(len(self.ids), Fields(BaseField.kXYZs | BaseField.kRGBs))
         cloud.mutable_xyzs()[:] = self.p_WQ.T
         cloud.mutable_xyzs()[2] += lift * (self.ids > 0)
-        cloud.mutable_rgbs()[:] = self.colors.T
+        # Meshcat takes a point's colour for linear light, and shows it brighter than meant.
+        cloud.mutable_rgbs()[:] = (255 * (self.colors.T / 255) ** GAMMA).astype(np.uint8)
         return cloud
 
     def tops(self) -> Mapping[int, NDArray[np.float64]]:
@@ -107,8 +115,9 @@ def points_of(frame: Frame, mask: NDArray) -> Points:
     )
     seen = (depth > 0) & ~robot
     p_CQ = back_project(depth, smaller)[seen]
-    tinted = draw_masks(color, ids, numbers=False)
-    return Points(p_CQ @ frame.X_WC[:3, :3].T + frame.X_WC[:3, 3], ids[seen], tinted[seen])
+    gray = color.mean(axis=-1, keepdims=True)
+    tinted = np.where(ids[..., None] > 0, TINT * object_colors(ids) + (1 - TINT) * gray, color)
+    return Points(p_CQ @ frame.X_WC[:3, :3].T + frame.X_WC[:3, 3], ids[seen], tinted[seen].astype(np.uint8))
 
 
 class MeshcatView(LeafSystem):
