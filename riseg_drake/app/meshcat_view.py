@@ -48,7 +48,7 @@ TINT = 0.7
 """How much of an object's colour lies over its points; the rest is how bright the camera sees them."""
 GAMMA = 2.2
 """Of the camera's pictures."""
-PICTURE_RATE = 3.0
+PICTURE_RATE = 2.0
 """How often the picture is renewed, 1/s."""
 PICTURE_WIDTH = 400
 """Of the panel's picture, pixels."""

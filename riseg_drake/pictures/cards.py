@@ -6,6 +6,7 @@ also in a replay.
 
 import json
 from base64 import b64encode
+from functools import cache
 from io import BytesIO
 
 import numpy as np
@@ -39,7 +40,7 @@ def set_card(meshcat: Meshcat, path: str, picture: NDArray[np.uint8], width: flo
 
 def text_card(text: str, object_id: int) -> NDArray[np.uint8]:
     """A line of text [H, W, 3] behind a field in an object's colour."""
-    font = ImageFont.load_default(_TEXT)
+    font = _font(_TEXT)
     left, _, right, _ = font.getbbox(text)
     field = _TEXT
     picture = Image.new("RGB", (int(right - left) + field + 3 * _PAD, _TEXT + 2 * _PAD), _PAPER)
@@ -54,14 +55,19 @@ def with_caption(picture: NDArray[np.uint8], text: str) -> NDArray[np.uint8]:
     """A picture [H, W, 3] with a line of text below it [H + h, W, 3]; the text is made to fit."""
     height, width = picture.shape[:2]
     size = max(12, width // 16)
-    font = ImageFont.load_default(size)
+    font = _font(size)
     room = width - 1.5 * size
     if font.getlength(text) > room:
-        font = ImageFont.load_default(size * room / font.getlength(text))
+        font = _font(int(size * room / font.getlength(text)))
     card = Image.new("RGB", (width, height + 2 * size), _PAPER)
     card.paste(Image.fromarray(picture))
     ImageDraw.Draw(card).text((0.75 * size, height + size), text, _INK, font, anchor="lm")
     return np.asarray(card)
+
+
+@cache
+def _font(size: float) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    return ImageFont.load_default(size)
 
 
 def _gltf(jpeg: bytes, width: float, height: float) -> str:

@@ -23,13 +23,19 @@ def test_the_slider_stands_at_the_end_of_the_page_with_its_marks():
     assert 'const marks = [["1", 2.5], ["2", 9.0]];' in page
 
 
-def test_a_replay_at_wall_time_is_whole_however_it_stops(tmp_path):
-    meshcat, file = Meshcat(), tmp_path / "replay.html"
-    with pytest.raises(KeyboardInterrupt), replay(meshcat, file, start=1.7e9) as kept:
+def interrupted(meshcat, file):
+    """A replay of two seconds at wall time, and Ctrl-C."""
+    with replay(meshcat, file, start=1.7e9) as kept:
         meshcat.SetObject("/box", Box(1, 1, 1), Rgba(1, 0, 0))
         meshcat.SetProperty("/box", "visible", False, 1.7e9 + 2.0)
         kept.mark(1, 1.7e9 + 1.5)
         raise KeyboardInterrupt
+
+
+def test_a_replay_at_wall_time_is_whole_however_it_stops(tmp_path):
+    meshcat, file = Meshcat(), tmp_path / "replay.html"
+    with pytest.raises(KeyboardInterrupt):
+        interrupted(meshcat, file)
     assert '[["1", 1.5]]' in file.read_text()
     assert meshcat.get_mutable_recording().frame(1.7e9 + 2.0) == 2 * meshcat_replay.FRAME_RATE
 

@@ -1,4 +1,4 @@
-"""A push before it is done: its way, what it sweeps, and an arm of glass that does it again and again."""
+"""A push before it is done: the way of the tip, and an arm of glass that does it again and again."""
 
 from collections.abc import Callable
 
@@ -8,7 +8,6 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
-from riseg_drake.app.meshcat_push import draw_push
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.pushing.push import Push
 from riseg_drake.robot.description import add_panda
@@ -32,7 +31,6 @@ class PlannedMotion:
         self._meshcat, self._clock = meshcat, clock
         panda = scenario.hardware.panda
         self._kinematics = PandaKinematics(panda)
-        self._pusher = scenario.push.action.pusher
         self._push: Push | None = None
         self._since = 0.0
         builder = DiagramBuilder()
@@ -59,7 +57,6 @@ class PlannedMotion:
             times = np.linspace(0, push.path.duration, POINTS)
             way = np.array([self._kinematics.X_WE(push.path.position(t))[:3, 3] for t in times])
             self._meshcat.SetLine(f"{PATH}/way", way.T, 3.0, WAY_COLOR)
-            draw_push(self._meshcat, f"{PATH}/push", push, self._pusher)
             self._place(push.path.position(0.0), now)
             self._meshcat.SetProperty(f"{PATH}/arm", "modulated_opacity", GLASS)
             self._meshcat.SetProperty(PATH, "visible", True, now)

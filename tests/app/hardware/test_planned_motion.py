@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from pydrake.geometry import Meshcat
 
-from riseg_drake.app.hardware import planned_motion
 from riseg_drake.app.hardware.planned_motion import PATH, PAUSE, PlannedMotion
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.robot.kinematics import READY, PandaKinematics
@@ -39,14 +38,14 @@ def test_the_arm_of_glass_is_where_the_motion_would_be_and_begins_again(scene):
         np.testing.assert_allclose(shown[-1] - READY, np.eye(7)[0] * turned, atol=1e-6)
 
 
-def test_arm_way_and_push_are_drawn(scene):
+def test_arm_and_way_are_drawn(scene):
     meshcat, motion, *_ = scene
     motion.show(planned())
-    for part in ("arm", "way", "push/arrow/shaft", "push/swept"):
+    for part in ("arm", "way"):
         assert meshcat.HasPath(f"{PATH}/{part}")
 
 
-def test_the_way_that_is_drawn_is_the_tips(scene, monkeypatch):
+def test_the_way_that_is_drawn_is_the_tips(scene):
     _, motion, *_ = scene
     ways = []
 
@@ -57,7 +56,6 @@ def test_the_way_that_is_drawn_is_the_tips(scene, monkeypatch):
         def SetProperty(self, *_):
             pass
 
-    monkeypatch.setattr(planned_motion, "draw_push", lambda *_: None)
     motion._meshcat = Paper()
     wanted = planned()
     motion.show(wanted)
