@@ -37,8 +37,8 @@ from riseg_drake.pushing.push import NO_PUSH, Push
 from riseg_drake.pushing.pusher import Pusher
 from riseg_drake.segmentation.segmentation import Segmentation, nothing_segmented
 
-POINT_STRIDE = 3
-"""Every third pixel in both directions becomes a point: 34 thousand at 640x480."""
+POINT_COLUMNS = 213
+"""About so many columns of pixels become points: every third at 640x480, which makes 34 thousand."""
 POINT_SIZE = 0.010
 """Meshcat draws points as wide as that under a field of view of 90 degrees, m; through a longer lens they are
 the smaller for it: 4 mm here."""
@@ -102,16 +102,17 @@ class Points:
 
 
 def points_of(frame: Frame, mask: NDArray) -> Points:
-    """Every `POINT_STRIDE`-th pixel of a frame with depth that is not the robot's, under its mask [H, W]."""
+    """Some pixels of a frame, in even steps, that have depth and are not the robot's, under its mask [H, W]."""
+    stride = max(1, round(frame.depth.shape[1] / POINT_COLUMNS))
     depth, color, robot, ids = (
-        np.ascontiguousarray(image[::POINT_STRIDE, ::POINT_STRIDE])
+        np.ascontiguousarray(image[::stride, ::stride])
         for image in (frame.depth, frame.color, frame.robot, mask)
     )
     camera = frame.intrinsics
     smaller = Intrinsics(
         depth.shape[1],
         depth.shape[0],
-        *(value / POINT_STRIDE for value in (camera.fx, camera.fy, camera.cx, camera.cy)),
+        *(value / stride for value in (camera.fx, camera.fy, camera.cx, camera.cy)),
     )
     seen = (depth > 0) & ~robot
     p_CQ = back_project(depth, smaller)[seen]

@@ -55,13 +55,16 @@ def with_caption(picture: NDArray[np.uint8], text: str) -> NDArray[np.uint8]:
     """A picture [H, W, 3] with a line of text below it [H + h, W, 3]; the text is made to fit."""
     height, width = picture.shape[:2]
     size = max(12, width // 16)
+    bar = 2 * size
     font = _font(size)
     room = width - 1.5 * size
-    if font.getlength(text) > room:
-        font = _font(int(size * room / font.getlength(text)))
-    card = Image.new("RGB", (width, height + 2 * size), _PAPER)
+    # As it is drawn: whole pixels for each letter, which is more than its nominal length.
+    while size > 8 and font.getbbox(text)[2] > room:
+        size -= 1
+        font = _font(size)
+    card = Image.new("RGB", (width, height + bar), _PAPER)
     card.paste(Image.fromarray(picture))
-    ImageDraw.Draw(card).text((0.75 * size, height + size), text, _INK, font, anchor="lm")
+    ImageDraw.Draw(card).text((bar * 3 / 8, height + bar / 2), text, _INK, font, anchor="lm")
     return np.asarray(card)
 
 

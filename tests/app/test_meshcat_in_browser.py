@@ -88,13 +88,21 @@ def test_it_opens_in_front_of_the_robot_and_above_the_table(page):
     assert (x, y, -z) == pytest.approx((0.5 + 0.72, 0.66, 0.0), abs=1e-3)
 
 
-def test_time_runs_to_the_end_and_an_interaction_can_be_found_again(seen):
-    _, path = seen
-    with opened((path / REPLAY).as_uri()) as page:
-        page.wait("viewer.animator.duration > 0 && viewer.animator.time > 0")
-        page.wait("document.querySelectorAll('#riseg-track a').length === 1")
-        page.ask("document.querySelector('#riseg-track a').onclick()")
-        share = float(page.ask("document.querySelector('#riseg-track a').style.left")[:-1]) / 100
-        expected = share * page.ask("viewer.animator.duration")
-        assert page.ask("viewer.animator.time") == pytest.approx(expected, abs=0.02)
-        assert page.complaints == []
+def test_its_time_runs(page):
+    page.ask("viewer.animator.pause()")
+    page.ask("viewer.animator.reset()")
+    page.ask("viewer.animator.play()")
+    page.wait("viewer.animator.time > 0.1")
+
+
+def test_an_interaction_is_found_again_by_its_mark(page):
+    marks = "document.querySelectorAll('#riseg-track a')"
+    if page.ask("location.protocol === 'http:'"):  # the live page is Meshcat's own
+        assert page.ask(f"{marks}.length") == 0
+        return
+    assert page.ask(f"{marks}.length") == 1
+    page.ask(f"{marks}[0].onclick()")
+    share = float(page.ask(f"{marks}[0].style.left")[:-1]) / 100
+    expected = share * page.ask("viewer.animator.duration")
+    assert page.ask("viewer.animator.time") == pytest.approx(expected, abs=0.02)
+    assert page.complaints == []

@@ -3,10 +3,10 @@ import pytest
 from pydrake.geometry import Meshcat
 
 from riseg_drake.app.meshcat_stage import EYE, PANEL, TARGET, facing, on_stage
-from riseg_drake.app.meshcat_view import GAMMA, POINT_STRIDE, caption_of, label_texts, panel_picture, points_of
-from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.app.meshcat_view import GAMMA, caption_of, label_texts, panel_picture, points_of
+from riseg_drake.geometry.camera import Intrinsics, back_project
 from riseg_drake.geometry.rgbd import Frame
-from riseg_drake.pictures.cards import set_card
+from riseg_drake.pictures.cards import set_card, with_caption
 from riseg_drake.pictures.object_colors import object_colors
 from riseg_drake.pushing.arm_path import ArmPhase
 from riseg_drake.segmentation.segmentation import Segmentation
@@ -33,13 +33,32 @@ def mask_of(object_id):
 
 def test_points_lie_in_the_world_tinted_in_the_colours_of_their_objects():
     points = points_of(frame(), mask_of(4))
-    # 10 x 10 points, less a row without depth and a row on the robot.
-    assert len(points.ids) == (30 // POINT_STRIDE) ** 2 - 20
+    # All of so few, less three rows without depth and three on the robot.
+    assert len(points.ids) == 30 * 24
     np.testing.assert_allclose(points.p_WQ[:, 2], 0.5, atol=1e-6)
     (middle,) = np.flatnonzero(np.linalg.norm(points.p_WQ - [0.3, 0, 0.5], axis=1) < 1e-6)
     assert points.ids[middle] == 4
     np.testing.assert_allclose(points.colors[middle], 0.7 * object_colors(np.array(4)) + 0.3 * 90, atol=1)
     assert (np.delete(points.colors, middle, axis=0) == 90).all()
+
+
+def test_of_many_pixels_every_third_is_where_it_would_be_among_all():
+    rows, columns = np.mgrid[:480, :640]
+    camera = Intrinsics(640, 480, 600.0, 610.0, 310.0, 250.0)
+    depth = (0.5 + 1e-4 * columns + 2e-4 * rows).astype(np.float32)
+    color = np.zeros((480, 640, 3), np.uint8)
+    seen = Frame(0, 0.0, camera, color, depth, np.eye(4), np.zeros((480, 640), bool))
+    points = points_of(seen, np.zeros((480, 640), np.uint16))
+    every = back_project(depth, camera)[::3, ::3].reshape(-1, 3)
+    np.testing.assert_allclose(points.p_WQ, every, atol=1e-6)
+
+
+def test_a_caption_that_is_too_long_is_made_to_fit():
+    text = "interaction 12, approach: 100 objects found " * 2
+    picture = with_caption(np.zeros((30, 320, 3), np.uint8), text)
+    inked = np.flatnonzero(picture[30:].max(axis=(0, 2)) > 128)
+    assert inked.min() > 0
+    assert inked.max() < 320 - 8
 
 
 def test_a_cloud_lifts_objects_only_and_has_linear_colours():
