@@ -37,6 +37,7 @@ def command_line() -> argparse.ArgumentParser:
         help="show it in the browser and save the replay as DIR/replay.html (no)",
     )
     add_export(run)
+    _add_wait(run)
 
     evaluate = _add(
         subparsers,
@@ -103,8 +104,12 @@ def command_line() -> argparse.ArgumentParser:
     hardware.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/SCENARIO_TIME)")
     hardware.add_argument("--record", action="store_true", help="also write every frame to DIR/recording")
     hardware.add_argument(
-        "--meshcat", action=argparse.BooleanOptionalAction, default=False, help="show it in the browser (no)"
+        "--meshcat",
+        action=argparse.BooleanOptionalAction,
+        default=False,
+        help="show it in the browser and save the replay as DIR/replay.html (no)",
     )
+    _add_wait(hardware)
     hardware.add_argument(
         "--dry-run", action="store_true", help="show every planned push in the browser, and move nothing"
     )
@@ -368,6 +373,15 @@ def _add_source(command: argparse.ArgumentParser) -> None:
 def _add_overwrite(command: argparse.ArgumentParser, earlier: str) -> None:
     command.add_argument(
         "--overwrite", action="store_true", help=f"remove an earlier {earlier} from the output folder (no)"
+    )
+
+
+def _add_wait(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--wait",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="keep the browser's view until Enter once it is over (yes, at a terminal)",
     )
 
 

@@ -19,7 +19,7 @@ from pydrake.systems.framework import (
 )
 from pydrake.trajectories import PiecewisePolynomial
 
-from riseg_drake.app.meshcat_view import MeshcatView
+from riseg_drake.app.meshcat_view import MeshcatView, Stage
 from riseg_drake.app.planned_speed import push_parameters
 from riseg_drake.app.refinement_block import add_refinement
 from riseg_drake.app.scenario import Scenario
@@ -216,10 +216,10 @@ def make_diagram(
     builder.Connect(arm.GetOutputPort("position"), station.GetInputPort("panda.position"))
     refiner = add_refinement(builder, scenario, segmentation, arm)
     if meshcat is not None:
-        view = builder.AddSystem(MeshcatView(meshcat, 1 / config.camera.rate))
+        view = builder.AddSystem(MeshcatView(meshcat, 1 / config.camera.rate, _stage(scenario)))
         for name in ("pair", "segmentation"):
             builder.Connect(segmentation.outputs[name], view.GetInputPort(name))
-        for name in ("active_push", "interaction_step"):
+        for name in ("active_push", "interaction_step", "phase"):
             builder.Connect(arm.GetOutputPort(name), view.GetInputPort(name))
 
     for index in range(station.num_output_ports()):
@@ -234,3 +234,11 @@ def make_diagram(
     diagram = builder.Build()
     diagram.set_name("rt-RISeg")
     return WiredDiagram(diagram, station, [*segmentation.stages, planner, arm], scenario, refiner)
+
+
+def _stage(scenario: Scenario) -> Stage:
+    """What stands around the view; a simulation draws its table and things itself."""
+    config, pusher = scenario.station, scenario.push.action.pusher
+    if not isinstance(config, SimulatedStationConfig):
+        return Stage(config.centre_W, pusher)
+    return Stage(config.scene.centre_W, pusher, has_things=True)

@@ -82,6 +82,10 @@ class RecordedSource(ABC):
         """Whether `robot` or `label` is there and holds something."""
         return False
 
+    def images_beside(self, folder: str) -> int:
+        """How many frames have an image of their own in `robot` or `label`."""
+        return 0
+
     def _look_at_scale(self, depth: NDArray[np.float32], file: Path | str) -> None:
         """Warn of a depth [H, W], m, that is unlikely on the whole; `file` says what it is measured in."""
         if not (depth > 0).any():

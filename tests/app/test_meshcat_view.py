@@ -1,11 +1,15 @@
 import numpy as np
+import pytest
 from pydrake.geometry import Meshcat
 
-from riseg_drake.app.meshcat_view import POINT_STRIDE, draw_arrow, object_cloud
-from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.app.meshcat_stage import EYE, PANEL, TARGET, facing, on_stage
+from riseg_drake.app.meshcat_view import GAMMA, caption_of, label_texts, panel_picture, points_of
+from riseg_drake.geometry.camera import Intrinsics, back_project
 from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.pictures.cards import set_card, with_caption
 from riseg_drake.pictures.object_colors import object_colors
-from riseg_drake.pushing.push import Push
+from riseg_drake.pushing.arm_path import ArmPhase
+from riseg_drake.segmentation.segmentation import Segmentation
 
 INTRINSICS = Intrinsics(30, 30, 30.0, 30.0, 15.0, 15.0)
 
@@ -21,32 +25,88 @@ def frame():
     return Frame(0, 0.0, INTRINSICS, np.full((30, 30, 3), 90, np.uint8), depth, X_WC, robot)
 
 
-def test_points_lie_in_the_world_in_the_colours_of_their_objects():
+def mask_of(object_id):
     mask = np.zeros((30, 30), np.uint16)
-    mask[15, 15] = 4
-    cloud = object_cloud(frame(), mask)
-    # 10 x 10 points, less a row without depth and a row on the robot.
-    assert cloud.size() == (30 // POINT_STRIDE) ** 2 - 20
-    np.testing.assert_allclose(cloud.xyzs()[2], 0.5, atol=1e-6)
-    (middle,) = np.flatnonzero(np.linalg.norm(cloud.xyzs().T - [0.3, 0, 0.5], axis=1) < 1e-6)
-    np.testing.assert_array_equal(cloud.rgbs()[:, middle], object_colors(np.array(4)))
-    assert (np.delete(cloud.rgbs(), middle, axis=1) == 90).all()
+    mask[15, 15] = object_id
+    return mask
 
 
-def test_a_push_is_drawn_as_shaft_and_head():
-    meshcat = Meshcat()
-    push = Push(
-        p_WE=np.zeros(3),
-        tip_height=0.01,
-        direction_W=np.array([0.6, 0.8]),
-        p_WB=np.array([0.5, 0.0, 0.02]),
-        length=0.03,
-        d_push=0.02,
-        center_W=np.zeros(2),
-        cluster_W=np.zeros((0, 2)),
-        tallest=0.03,
-        cost=0.0,
+def test_points_lie_in_the_world_tinted_in_the_colours_of_their_objects():
+    points = points_of(frame(), mask_of(4))
+    # All of so few, less three rows without depth and three on the robot.
+    assert len(points.ids) == 30 * 24
+    np.testing.assert_allclose(points.p_WQ[:, 2], 0.5, atol=1e-6)
+    (middle,) = np.flatnonzero(np.linalg.norm(points.p_WQ - [0.3, 0, 0.5], axis=1) < 1e-6)
+    assert points.ids[middle] == 4
+    np.testing.assert_allclose(points.colors[middle], 0.7 * object_colors(np.array(4)) + 0.3 * 90, atol=1)
+    assert (np.delete(points.colors, middle, axis=0) == 90).all()
+
+
+def test_of_many_pixels_every_third_is_where_it_would_be_among_all():
+    rows, columns = np.mgrid[:480, :640]
+    camera = Intrinsics(640, 480, 600.0, 610.0, 310.0, 250.0)
+    depth = (0.5 + 1e-4 * columns + 2e-4 * rows).astype(np.float32)
+    color = np.zeros((480, 640, 3), np.uint8)
+    seen = Frame(0, 0.0, camera, color, depth, np.eye(4), np.zeros((480, 640), bool))
+    points = points_of(seen, np.zeros((480, 640), np.uint16))
+    every = back_project(depth, camera)[::3, ::3].reshape(-1, 3)
+    np.testing.assert_allclose(points.p_WQ, every, atol=1e-6)
+
+
+def test_a_caption_that_is_too_long_is_made_to_fit():
+    text = "interaction 12, approach: 100 objects found"
+    picture = with_caption(np.zeros((30, 320, 3), np.uint8), text)
+    inked = np.flatnonzero(picture[30:].max(axis=(0, 2)) > 128)
+    assert inked.min() > 0
+    assert inked.max() < 320 - 8
+
+
+def test_a_cloud_lifts_objects_only_and_has_linear_colours():
+    points = points_of(frame(), mask_of(4))
+    cloud = points.cloud(0.01)
+    np.testing.assert_allclose(cloud.xyzs()[2], np.where(points.ids > 0, 0.51, 0.5), atol=1e-6)
+    np.testing.assert_allclose(cloud.rgbs()[:, 0] / 255, (90 / 255) ** GAMMA, atol=1 / 255)
+    assert points.of_objects.cloud(0.01).size() == 1
+
+
+def test_a_label_stands_over_the_middle_of_its_object():
+    tops = points_of(frame(), mask_of(4)).tops()
+    assert list(tops) == [4]
+    np.testing.assert_allclose(tops[4], [0.3, 0.0, 0.5], atol=1e-6)
+
+
+def test_a_label_says_how_sure_its_object_is_and_whether_that_is_too_little():
+    # By definition half sure at half the margin that settles.
+    segmentation = Segmentation(0, mask_of(1), {1: 1.0, 2: 2.0}, settled=2.0)
+    assert label_texts(segmentation) == {1: "1  50 %  in doubt", 2: "2  88 %"}
+
+
+def test_the_caption_counts_in_words():
+    segmentation = Segmentation(0, mask_of(4))
+    assert caption_of(2, ArmPhase.PUSH, segmentation) == "interaction 2, push: 1 object found"
+
+
+def test_the_panel_has_the_cameras_picture_above_a_line_of_text():
+    wide = np.zeros((480, 640, 3), np.uint8)
+    seen = Frame(
+        0, 0.0, INTRINSICS, wide, np.ones((480, 640), np.float32), np.eye(4), np.zeros((480, 640), bool)
     )
-    draw_arrow(meshcat, "/push", push)
-    assert meshcat.HasPath("/push/shaft")
-    assert meshcat.HasPath("/push/head")
+    picture = panel_picture(seen, Segmentation(0, np.zeros((480, 640), np.uint16)), "a caption")
+    assert picture.shape == (300 + 50, 400, 3)
+    assert (picture[:300] == 0).all()
+    assert picture[300:].max() > 200
+
+
+def test_a_card_faces_who_looks_from_the_front_and_stands_upright():
+    X_WK = facing(on_stage([0.5, 0.1], PANEL))
+    R = X_WK.rotation().matrix()
+    np.testing.assert_allclose(R[:, 1], (TARGET - EYE) / np.linalg.norm(TARGET - EYE), atol=1e-12)
+    assert R[2, 0] == pytest.approx(0.0)
+    assert R[2, 2] > 0
+    np.testing.assert_allclose(X_WK.translation(), np.array([0.5, 0.1, 0.0]) + PANEL)
+
+
+def test_a_card_is_an_object_of_the_scene():
+    meshcat = Meshcat()
+    set_card(meshcat, "/card", np.zeros((3, 4, 3), np.uint8), 0.2)
+    assert meshcat.HasPath("/card")

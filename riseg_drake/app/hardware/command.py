@@ -18,8 +18,10 @@ from riseg_drake.app.hardware.arm_travel import ARRIVED, WayBack, straight_motio
 from riseg_drake.app.hardware.arm_watch import ArmWatch
 from riseg_drake.app.hardware.drivers import PATIENCE, listening, wait_for_drivers
 from riseg_drake.app.hardware.dry_run import DryRun
+from riseg_drake.app.hardware.planned_motion import PlannedMotion
 from riseg_drake.app.hardware.terminal_operator import TerminalOperator
-from riseg_drake.app.output import RECORDING, RunFolder, Step
+from riseg_drake.app.meshcat_replay import replay, stay
+from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step
 from riseg_drake.app.planned_speed import check_limits, planned_limits
 from riseg_drake.app.run.command import Narrator, export_listener, report, state_of
 from riseg_drake.app.run.interactions import Listener, Progress, TruthSource, WallClock, interactions
@@ -52,6 +54,8 @@ class HardwareRequest:
     """Whether what the camera sees is recorded."""
     meshcat: bool = False
     """Whether it is shown in a browser; a dry run always is."""
+    wait: bool = True
+    """Whether the browser's view stays until Enter, once it is over."""
     dry_run: bool = False
     """Whether nothing moves."""
     yes: bool = False
@@ -85,6 +89,8 @@ def hardware_command(request: HardwareRequest, console: Console) -> None:
     )
     progress = Progress()
     steps: list[Step] = []
+    browser = StartMeshcat() if request.meshcat or dry_run else None
+    operator = TerminalOperator(console, request.yes)
     with folder:
         try:
             with (
@@ -93,10 +99,8 @@ def hardware_command(request: HardwareRequest, console: Console) -> None:
                 listening(config, request.replayed, request.truth) as (reception, truth_source),
             ):
                 console.print(f"{name}, results in {folder.path}")
-                browser = StartMeshcat() if request.meshcat or dry_run else None
                 with console.status("waiting for arm and camera") as status:
                     wait_for_drivers(reception, config, ready=not dry_run, say=status.update)
-                operator = TerminalOperator(console, request.yes)
                 session = _Session(
                     scenario,
                     seed,
@@ -120,6 +124,8 @@ def hardware_command(request: HardwareRequest, console: Console) -> None:
             raise
     report(steps, console)
     exports.tell(console)
+    if browser is not None:
+        stay(browser, folder.path / REPLAY, console, request.wait, operator.wait_for_enter)
 
 
 class _Session:
@@ -144,6 +150,7 @@ class _Session:
         self._console, self._meshcat, self._exports = console, meshcat, exports
         self._config = scenario.hardware
         self._progress, self._steps = progress, steps
+        self._planned = None if meshcat is None else PlannedMotion(scenario, meshcat, reception.clock)
         self._heard = (0, time.monotonic())
         self._stopped = False
 
@@ -202,7 +209,7 @@ class _Session:
         # Where the arm stands it looks from.
         self._config.start_position = [float(q) for q in self._reception.status.position]
         operator = None if unasked else self._operator
-        showing = DryRun(self._scenario, self._meshcat, operator, self._console, self._progress)
+        showing = DryRun(self._scenario, self._planned, operator, self._console, self._progress)
         wired = make_diagram(
             self._scenario,
             self._seed,
@@ -217,7 +224,8 @@ class _Session:
     def _interact(
         self, wired: WiredDiagram, look: Callable[[Context], bool], listeners: list[Listener]
     ) -> None:
-        with self._console.status("looking") as status:
+        with ExitStack() as stack:
+            status = stack.enter_context(self._console.status("looking"))
             narrator = Narrator(self._console, status)
             listeners = [
                 lambda *_: narrator.follow(self._progress),
@@ -225,6 +233,9 @@ class _Session:
                 export_listener(wired, self._exports),
             ]
             wall = WallClock(self._reception.clock(), lambda context: self._look(look, context))
+            if self._meshcat is not None:
+                kept = stack.enter_context(replay(self._meshcat, self._folder.path / REPLAY, wall.start))
+                listeners.append(lambda frame, _: kept.mark(self._progress.interaction_step, frame.time))
             for step in interactions(
                 wired,
                 StageClock(),
@@ -265,6 +276,8 @@ class _Session:
 
     def _permit(self, push: Push) -> Permission:
         said = self._operator.permit(push)
+        if self._planned is not None:
+            self._planned.show(push) if said is Permission.WAIT else self._planned.hide()
         if said is Permission.END:
             self._progress.end = self._operator.why_quit
         return said

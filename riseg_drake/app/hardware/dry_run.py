@@ -1,11 +1,11 @@
-"""A dry run: every push is shown, with the way of the tip, and none is done."""
+"""A dry run: every push is shown, and none is done."""
 
 import time
 
 import numpy as np
-from pydrake.geometry import Meshcat, Rgba
 from rich.console import Console
 
+from riseg_drake.app.hardware.planned_motion import PlannedMotion
 from riseg_drake.app.hardware.terminal_operator import TerminalOperator
 from riseg_drake.app.run.interactions import Progress
 from riseg_drake.app.scenario import Scenario
@@ -18,12 +18,12 @@ SHOWN_FOR = 2.0
 
 
 class DryRun:
-    """A dry run's permission: every push is shown, with the way of the tip, and none is done."""
+    """A dry run's permission: every push is shown, and none is done."""
 
     def __init__(
         self,
         scenario: Scenario,
-        meshcat: Meshcat | None,
+        planned: PlannedMotion | None,
         operator: TerminalOperator | None,
         console: Console,
         progress: Progress,
@@ -31,7 +31,7 @@ class DryRun:
         """`operator` None: nobody is asked. Why it ends is entered in `progress`."""
         self._kinematics = PandaKinematics(scenario.hardware.panda)
         self._most = scenario.arm.most_interactions
-        self._meshcat, self._operator, self._console = meshcat, operator, console
+        self._planned, self._operator, self._console = planned, operator, console
         self._progress = progress
         self._push: Push | None = None
         self._since = 0.0
@@ -42,7 +42,9 @@ class DryRun:
         if push is not self._push:
             self._push, self._since = push, time.monotonic()
             self._shown += 1
-            self._draw(push)
+            self._describe(push)
+        if self._planned is not None:
+            self._planned.show(push)
         if self._operator is None:
             if time.monotonic() - self._since < SHOWN_FOR:
                 return Permission.WAIT
@@ -60,16 +62,13 @@ class DryRun:
         self._progress.end = why
         return Permission.END
 
-    def _draw(self, push: Push) -> None:
+    def _describe(self, push: Push) -> None:
         assert push.path is not None
-        times = np.linspace(0, push.path.duration, 200)
-        way = np.array([self._kinematics.X_WE(push.path.position(t))[:3, 3] for t in times])
-        lowest = min(self._kinematics.clearance(push.path.position(t)) for t in times[::4])
+        times = np.linspace(0, push.path.duration, 50)
+        lowest = min(self._kinematics.clearance(push.path.position(t)) for t in times)
         x, y = push.p_WB[:2]
         self._console.print(
             f"push {self._shown} at ({x:.3f}, {y:.3f}) m, tip at z = {push.p_WE[2]:.3f} m, "
             f"{push.path.duration:.1f} s, nothing nearer than "
             f"{1e3 * lowest:.0f} mm to table or arm"
         )
-        if self._meshcat is not None:
-            self._meshcat.SetLine("/riseg/planned_way", way.T, 3.0, Rgba(0.84, 0.37, 0.0))

@@ -93,6 +93,14 @@ class TerminalOperator:
         said = self.answer(f"{stop}: g to go on once that is mended, q to end", f"g {QUIT}")
         return None if not said else said == "g"
 
+    def wait_for_enter(self) -> None:
+        """Wait for one more line, or for the end of them."""
+        self._start_reading()
+        while not self._lines.empty():
+            self._lines.get()
+        while self._lines.empty() and not self._closed:
+            time.sleep(0.05)
+
     def tell(self, text: str) -> None:
         """Say something that needs no answer."""
         self._console.print(text, highlight=False)

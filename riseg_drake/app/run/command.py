@@ -16,6 +16,7 @@ from rich.status import Status
 from riseg_drake.app.diagram import WiredDiagram, make_diagram
 from riseg_drake.app.exports import Exports, exporting
 from riseg_drake.app.graphics import require_graphics
+from riseg_drake.app.meshcat_replay import replay, stay
 from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step
 from riseg_drake.app.report_page import REPORT
 from riseg_drake.app.run.interactions import Listener, Progress, interactions, simulated_truth
@@ -27,7 +28,6 @@ from riseg_drake.app.work_state import end_noted
 from riseg_drake.evaluation.in_motion import pooled
 from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.rgbd import Frame
-from riseg_drake.recording.whole_file import write_text
 from riseg_drake.systems.mask_refiner import NO_REFINED_MASK, RefinedMask
 from riseg_drake.systems.stage_clock import StageClock
 
@@ -45,6 +45,8 @@ class RunRequest:
     """Whether what the camera sees is recorded."""
     meshcat: bool = False
     """Whether it is shown in a browser."""
+    wait: bool = True
+    """Whether the browser's view stays until Enter, once it is over."""
     overwrite: bool = False
     """Whether an earlier run there is removed first."""
     export: tuple[str, ...] = ()
@@ -69,6 +71,8 @@ def run_command(request: RunRequest, console: Console) -> None:
     report(steps, console)
     exports.tell(console)
     console.print(f"to look at: {path / REPORT}", highlight=False, soft_wrap=True)
+    if browser is not None:
+        stay(browser, folder.path / REPLAY, console, request.wait)
 
 
 def run(
@@ -96,7 +100,8 @@ def run(
         if exports is not None:
             listeners.append(export_listener(wired, stack.enter_context(exporting(exports, folder.note))))
         if meshcat is not None:
-            stack.enter_context(_replay(meshcat, folder.path / REPLAY))
+            kept = stack.enter_context(replay(meshcat, folder.path / REPLAY))
+            listeners.append(lambda frame, _: kept.mark(progress.interaction_step, frame.time))
         for step in interactions(wired, StageClock(), progress, scenario.longest, tuple(listeners)):
             folder.write_step(step)
             steps.append(step)
@@ -231,18 +236,6 @@ class RefinedSteps:
                     scores = None if truth is None else score(each.mask, truth)
                     self._steps[k] = replace(step, refined_mask=each.mask, refined_scores=scores)
                     self._folder.write_refined(self._steps[k])
-
-
-@contextmanager
-def _replay(meshcat: Meshcat, file: Path) -> Iterator[None]:
-    """Keep what Meshcat shows, and save it as one HTML file."""
-    meshcat.StartRecording(set_visualizations_while_recording=True)
-    try:
-        yield
-    finally:
-        meshcat.StopRecording()
-        meshcat.PublishRecording()
-        write_text(file, meshcat.StaticHtml())
 
 
 def report(steps: list[Step], console: Console) -> None:

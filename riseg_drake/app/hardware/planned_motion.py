@@ -1,0 +1,75 @@
+"""A push before it is done: the way of the tip, and an arm of glass that does it again and again."""
+
+from collections.abc import Callable
+
+import numpy as np
+from pydrake.geometry import Meshcat, MeshcatVisualizer, MeshcatVisualizerParams, Rgba, SceneGraph
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.rendering import MultibodyPositionToGeometryPose
+
+from riseg_drake.app.scenario import Scenario
+from riseg_drake.pushing.push import Push
+from riseg_drake.robot.description import add_panda
+from riseg_drake.robot.kinematics import PandaKinematics
+
+PATH = "/riseg/planned"
+GLASS = 0.35
+"""Opacity of the arm that does not move yet."""
+PAUSE = 1.0
+"""Between the end of the motion and its beginning, s."""
+POINTS = 200
+"""Of the way of the tip."""
+WAY_COLOR = Rgba(0.84, 0.37, 0.0)
+
+
+class PlannedMotion:
+    """Plays what the arm is going to do, at wall time, for whoever is to permit it."""
+
+    def __init__(self, scenario: Scenario, meshcat: Meshcat, clock: Callable[[], float]):
+        """`clock` tells wall time as the diagram counts it, s: a replay keeps the motion at that time."""
+        self._meshcat, self._clock = meshcat, clock
+        panda = scenario.hardware.panda
+        self._kinematics = PandaKinematics(panda)
+        self._push: Push | None = None
+        self._since = 0.0
+        builder = DiagramBuilder()
+        plant = MultibodyPlant(0.0)
+        scene_graph = builder.AddSystem(SceneGraph())
+        plant.RegisterAsSourceForSceneGraph(scene_graph)
+        add_panda(plant, panda)
+        plant.Finalize()
+        poses = builder.AddSystem(MultibodyPositionToGeometryPose(plant))
+        builder.ExportInput(poses.get_input_port(), "position")
+        builder.Connect(poses.get_output_port(), scene_graph.get_source_pose_port(plant.get_source_id()))
+        MeshcatVisualizer.AddToBuilder(
+            builder, scene_graph, meshcat, MeshcatVisualizerParams(prefix=f"{PATH}/arm")
+        )
+        self._diagram = builder.Build()
+        self._context = self._diagram.CreateDefaultContext()
+
+    def show(self, push: Push) -> None:
+        """To be called again and again: the arm of glass is where the motion would be by now."""
+        assert push.path is not None
+        now = self._clock()
+        if push is not self._push:
+            self._push, self._since = push, now
+            times = np.linspace(0, push.path.duration, POINTS)
+            way = np.array([self._kinematics.X_WE(push.path.position(t))[:3, 3] for t in times])
+            self._meshcat.SetLine(f"{PATH}/way", way.T, 3.0, WAY_COLOR)
+            self._place(push.path.position(0.0), now)
+            self._meshcat.SetProperty(f"{PATH}/arm", "modulated_opacity", GLASS)
+            self._meshcat.SetProperty(PATH, "visible", True, now)
+        passed = (now - self._since) % (push.path.duration + PAUSE)
+        self._place(push.path.position(min(passed, push.path.duration)), now)
+
+    def hide(self) -> None:
+        """It was decided on."""
+        if self._push is not None:
+            self._push = None
+            self._meshcat.SetProperty(PATH, "visible", False, self._clock())
+
+    def _place(self, q: np.ndarray, now: float) -> None:
+        self._diagram.get_input_port().FixValue(self._context, q)
+        self._context.SetTime(now)
+        self._diagram.ForcedPublish(self._context)
