@@ -5,9 +5,9 @@ from pathlib import Path
 
 from riseg_drake.app import commands
 from riseg_drake.app.export_options import add_export
+from riseg_drake.app.options import add_overwrite, add_scenario, add_source, add_wait, positive, seed_number
 from riseg_drake.app.package import package_version
 from riseg_drake.app.parser import Parser
-from riseg_drake.app.source_options import add_source_options
 
 
 def command_line() -> argparse.ArgumentParser:
@@ -25,10 +25,12 @@ def command_line() -> argparse.ArgumentParser:
         "Nudge the objects of one simulated scene until each is found, and score the masks.\n"
         "Writes pictures, masks and scores of every interaction to the output folder.",
     )
-    _add_scenario(run)
-    run.add_argument("--seed", type=_seed, default=0, metavar="N", help="draws the scene and the noise (0)")
+    add_scenario(run)
+    run.add_argument(
+        "--seed", type=seed_number, default=0, metavar="N", help="draws the scene and the noise (0)"
+    )
     run.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/SCENARIO_seed_N)")
-    _add_overwrite(run, "run")
+    add_overwrite(run, "run")
     run.add_argument("--record", action="store_true", help="also write every frame to DIR/recording")
     run.add_argument(
         "--meshcat",
@@ -37,7 +39,7 @@ def command_line() -> argparse.ArgumentParser:
         help="show it in the browser and save the replay as DIR/replay.html (no)",
     )
     add_export(run)
-    _add_wait(run)
+    add_wait(run)
 
     evaluate = _add(
         subparsers,
@@ -53,21 +55,21 @@ def command_line() -> argparse.ArgumentParser:
         "of still things by a camera that moves and errs",
     )
     evaluate.add_argument(
-        "--scenes", type=_positive, metavar="N", help="how many (20); of a suite, of each kind (5)"
+        "--scenes", type=positive, metavar="N", help="how many (20); of a suite, of each kind (5)"
     )
     evaluate.add_argument(
         "--seed",
-        type=_seed,
+        type=seed_number,
         default=100,
         metavar="S",
         help="of the first scene, the others follow (100; the program was developed on 0 to 19)",
     )
     evaluate.add_argument("--objects", type=Path, metavar="DIR", help="draw from these SDF or URDF models")
-    evaluate.add_argument("--jobs", type=_positive, default=1, metavar="J", help="scenes at a time (1)")
+    evaluate.add_argument("--jobs", type=positive, default=1, metavar="J", help="scenes at a time (1)")
     evaluate.add_argument(
         "--output", type=Path, metavar="DIR", help="output folder (out/evaluate_SCENARIO_seed_S)"
     )
-    _add_overwrite(evaluate, "evaluation")
+    add_overwrite(evaluate, "evaluation")
     evaluate.add_argument(
         "--recordings", type=Path, metavar="DIR", help="with --suite films: also segment the recordings in DIR"
     )
@@ -100,7 +102,7 @@ def command_line() -> argparse.ArgumentParser:
     hardware.add_argument(
         "scenario", type=Path, nargs="?", metavar="SCENARIO", help="a YAML file (the built-in hardware.yaml)"
     )
-    hardware.add_argument("--seed", type=_seed, default=0, metavar="N", help="draws samples (0)")
+    hardware.add_argument("--seed", type=seed_number, default=0, metavar="N", help="draws samples (0)")
     hardware.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/SCENARIO_TIME)")
     hardware.add_argument("--record", action="store_true", help="also write every frame to DIR/recording")
     hardware.add_argument(
@@ -109,7 +111,7 @@ def command_line() -> argparse.ArgumentParser:
         default=False,
         help="show it in the browser and save the replay as DIR/replay.html (no)",
     )
-    _add_wait(hardware)
+    add_wait(hardware)
     hardware.add_argument(
         "--dry-run", action="store_true", help="show every planned push in the browser, and move nothing"
     )
@@ -135,7 +137,7 @@ def command_line() -> argparse.ArgumentParser:
         "scenario", type=Path, nargs="?", metavar="SCENARIO", help="a YAML file (the built-in hardware.yaml)"
     )
     hand_eye.add_argument("--output", type=Path, metavar="DIR", help="folder for pictures (out/hand_eye)")
-    _add_overwrite(hand_eye, "check")
+    add_overwrite(hand_eye, "check")
     hand_eye.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
 
     emulate = _add(
@@ -145,8 +147,10 @@ def command_line() -> argparse.ArgumentParser:
         "Stand in for the drivers of a Panda and a RealSense camera on LCM, around a simulated scene.\n"
         "Runs at wall-clock time until Ctrl-C, and misbehaves when it is told to.",
     )
-    _add_scenario(emulate)
-    emulate.add_argument("--seed", type=_seed, default=0, metavar="N", help="draws scene, noise and faults (0)")
+    add_scenario(emulate)
+    emulate.add_argument(
+        "--seed", type=seed_number, default=0, metavar="N", help="draws scene, noise and faults (0)"
+    )
     emulate.add_argument(
         "--control-mode",
         choices=("status_only", "velocity", "position"),
@@ -186,7 +190,7 @@ def command_line() -> argparse.ArgumentParser:
         help="its folder, or the file of a bag (the sample that ships with the package)",
     )
     segment.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/segment_NAME)")
-    _add_overwrite(segment, "segmentation")
+    add_overwrite(segment, "segmentation")
     segment.add_argument(
         "--scenario",
         type=Path,
@@ -194,7 +198,7 @@ def command_line() -> argparse.ArgumentParser:
         help="a YAML file (the recorded run's, or the built-in one)",
     )
     segment.add_argument(
-        "--seed", type=_seed, metavar="N", help="draws the samples (that of the recorded run, or 0)"
+        "--seed", type=seed_number, metavar="N", help="draws the samples (that of the recorded run, or 0)"
     )
     segment.add_argument(
         "--robot", type=Path, metavar="FILE", help="URDF or SDF of the robot that joints.csv is of (the Panda)"
@@ -205,7 +209,7 @@ def command_line() -> argparse.ArgumentParser:
         metavar="NAME",
         help="frame of that robot: x right, y down, z ahead in the image (camera)",
     )
-    _add_source(segment)
+    add_source(segment)
     add_export(segment)
     segment.add_argument(
         "--strict",
@@ -222,7 +226,7 @@ def command_line() -> argparse.ArgumentParser:
     )
     convert.add_argument("recording", type=Path, metavar="RECORDING", help="its folder, or the file of a bag")
     convert.add_argument("output", type=Path, metavar="FOLDER", help="a new folder")
-    _add_source(convert)
+    add_source(convert)
 
     score = _add(
         subparsers,
@@ -236,18 +240,18 @@ def command_line() -> argparse.ArgumentParser:
     score.add_argument("--json", type=Path, metavar="FILE", help="also write all figures, per image too")
     score.add_argument(
         "--ignore",
-        type=_seed,
+        type=seed_number,
         metavar="ID",
         help="true value whose pixels do not count (none; VOC, DAVIS: 255)",
     )
     score.add_argument(
         "--background",
-        type=_seed,
+        type=seed_number,
         metavar="ID",
         help="true value that is background beside 0 (none; the table of UOIS and OCID: 1)",
     )
     score.add_argument(
-        "--predicted-background", type=_seed, metavar="ID", help="the same of the predicted masks (none)"
+        "--predicted-background", type=seed_number, metavar="ID", help="the same of the predicted masks (none)"
     )
 
     bench = _add(
@@ -257,11 +261,13 @@ def command_line() -> argparse.ArgumentParser:
         "Measure time and memory of every stage of the segmentation for a 640x480 image pair.\n"
         "The pairs are a rendered push, held in memory; nothing is written.",
     )
-    _add_scenario(bench)
-    bench.add_argument("--seed", type=_seed, default=0, metavar="N", help="draws the scene and the noise (0)")
+    add_scenario(bench)
+    bench.add_argument(
+        "--seed", type=seed_number, default=0, metavar="N", help="draws the scene and the noise (0)"
+    )
     bench.add_argument(
         "--stream",
-        type=_positive,
+        type=positive,
         metavar="SECONDS",
         help="measure instead how evenly commands for a real arm are sent beside the segmentation",
     )
@@ -295,7 +301,7 @@ def command_line() -> argparse.ArgumentParser:
         "Draw the wired diagram of a scenario, as DOT or (with graphviz installed) as SVG.\n"
         "Without an output file the DOT text goes to the terminal.",
     )
-    _add_scenario(diagram)
+    add_scenario(diagram)
     diagram.add_argument("--output", type=Path, metavar="FILE", help="a file that ends in .dot or .svg")
 
     pictures = _add(
@@ -305,9 +311,9 @@ def command_line() -> argparse.ArgumentParser:
         "Make the pictures of the documentation anew: one run as a GIF and as a strip, the wired diagrams.\n"
         "With --evaluation also the figure of an evaluation.",
     )
-    _add_scenario(pictures)
+    add_scenario(pictures)
     pictures.add_argument(
-        "--seed", type=_seed, default=4, metavar="N", help="draws the scene and the noise (4)"
+        "--seed", type=seed_number, default=4, metavar="N", help="draws the scene and the noise (4)"
     )
     pictures.add_argument(
         "--output", type=Path, default=Path("out/pictures"), metavar="DIR", help="folder (out/pictures)"
@@ -331,65 +337,3 @@ def _add(commands, name, call, explanation) -> argparse.ArgumentParser:  # type:
     )
     command.set_defaults(call=call)
     return command
-
-
-def _positive(text: str) -> int:
-    number = int(text) if text.isdecimal() else 0
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 up")
-    return number
-
-
-def _seed(text: str) -> int:
-    if not text.isdecimal() or len(text) > 9:
-        raise argparse.ArgumentTypeError(f"{text[:20]!r} is not a whole number from 0 to 999999999")
-    return int(text)
-
-
-def _seconds(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = -1.0
-    if not 0 < seconds < 1e6:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds above 0")
-    return seconds
-
-
-def _add_source(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--stamp-limit",
-        type=_seconds,
-        default=0.02,
-        metavar="S",
-        help="how far apart in time what belongs together may be, s (0.02)",
-    )
-    command.add_argument(
-        "--follow", action="store_true", help="follow links and paths that lead out of the recording (no)"
-    )
-    add_source_options(command)
-
-
-def _add_overwrite(command: argparse.ArgumentParser, earlier: str) -> None:
-    command.add_argument(
-        "--overwrite", action="store_true", help=f"remove an earlier {earlier} from the output folder (no)"
-    )
-
-
-def _add_wait(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--wait",
-        action=argparse.BooleanOptionalAction,
-        default=True,
-        help="keep the browser's view until Enter once it is over (yes, at a terminal)",
-    )
-
-
-def _add_scenario(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "scenario",
-        type=Path,
-        nargs="?",
-        metavar="SCENARIO",
-        help="a YAML file (the built-in simulation)",
-    )

@@ -1,0 +1,75 @@
+"""Options that several commands of `riseg` have, and the numbers that they take."""
+
+import argparse
+from pathlib import Path
+
+from riseg_drake.app.source_options import add_source_options
+
+
+def positive(text: str) -> int:
+    """A whole number from 1 up."""
+    number = int(text) if text.isdecimal() else 0
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 up")
+    return number
+
+
+def seed_number(text: str) -> int:
+    """A whole number from 0 to 999999999."""
+    if not text.isdecimal() or len(text) > 9:
+        raise argparse.ArgumentTypeError(f"{text[:20]!r} is not a whole number from 0 to 999999999")
+    return int(text)
+
+
+def seconds(text: str) -> float:
+    """A time above 0, s."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = -1.0
+    if not 0 < number < 1e6:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds above 0")
+    return number
+
+
+def add_source(command: argparse.ArgumentParser) -> None:
+    """What a person may say of a recording that it does not say itself."""
+    command.add_argument(
+        "--stamp-limit",
+        type=seconds,
+        default=0.02,
+        metavar="S",
+        help="how far apart in time what belongs together may be, s (0.02)",
+    )
+    command.add_argument(
+        "--follow", action="store_true", help="follow links and paths that lead out of the recording (no)"
+    )
+    add_source_options(command)
+
+
+def add_overwrite(command: argparse.ArgumentParser, earlier: str) -> None:
+    """Whether an `earlier` run, evaluation or the like is removed."""
+    command.add_argument(
+        "--overwrite", action="store_true", help=f"remove an earlier {earlier} from the output folder (no)"
+    )
+
+
+def add_wait(command: argparse.ArgumentParser) -> None:
+    """Whether the browser's view stays."""
+    command.add_argument(
+        "--wait",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="keep the browser's view until Enter once it is over (yes, at a terminal)",
+    )
+
+
+def add_scenario(command: argparse.ArgumentParser) -> None:
+    """The scenario, which may be left out."""
+    command.add_argument(
+        "scenario",
+        type=Path,
+        nargs="?",
+        metavar="SCENARIO",
+        help="a YAML file (the built-in simulation)",
+    )
