@@ -23,7 +23,6 @@ from riseg_drake.recording.bop_scene import SCENE_CAMERA, read_bop_scene
 from riseg_drake.recording.camera_file import read_camera
 from riseg_drake.recording.image_lists import ImageLists, image_lists
 from riseg_drake.recording.layout import LeftOut, RecordedFrame, RecordingError
-from riseg_drake.recording.registration import Registration
 from riseg_drake.recording.source import STAMP_LIMIT, RecordedSource, SourceOptions
 from riseg_drake.recording.stamped_lists import (
     FEW,
