@@ -135,7 +135,7 @@ def pose_between(poses: StampedTable, time: float, limit: float) -> NDArray[np.f
 
 
 def row_between(table: StampedTable, time: float, limit: float) -> NDArray[np.float64] | None:
-    """The row that belongs to a moment, s, such as joint angles; None if no row is near."""
+    """The row [K] that belongs to a moment, s, such as joint angles; None if no row is near."""
     bracket = table.bracket(time, limit)
     if bracket is None:
         return None

@@ -106,5 +106,5 @@ def depth_to_units(depth: NDArray, units: float) -> NDArray[np.uint16]:
 
 
 def depth_to_millimetres(depth: NDArray) -> NDArray[np.uint16]:
-    """The same for millimetres."""
+    """Depth [H, W] from metres to whole millimetres of 16 bits; what does not fit becomes 0, invalid."""
     return depth_to_units(depth, layout.MILLIMETRES)

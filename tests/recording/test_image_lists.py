@@ -120,7 +120,7 @@ def test_a_scene_of_bop_has_its_cameras_and_poses_in_millimetres(numbered):
     scene.write_text(json.dumps({"0": camera, "2": {**camera, "depth_scale": 1.0}}))
     with pytest.raises(RecordingError, match="cam_K or depth_scale differs between images"):
         read(numbered, rate=1.0)
-    with pytest.raises(RecordingError, match="--rate HZ says how many a second"):
+    with pytest.raises(RecordingError, match="is a BOP scene; --rate HZ says how many"):
         read(numbered)
 
 

@@ -31,7 +31,10 @@ class ConvertRequest:
 
 
 def convert_command(request: ConvertRequest, console: Console) -> None:
-    """Write the frames of a recording into a new folder; what was written stays where it is stopped."""
+    """Write the frames of a recording into a new folder; what was written stays where it is stopped.
+
+    Raises RecordingError.
+    """
     options = SourceOptions(
         request.stamp_limit, request.follow, request.rate, request.topics, request.world_frame
     )

@@ -70,7 +70,8 @@ def recorded_view(
     if reader.joints is None:
         if robot is not None:
             raise RecordingError(
-                f"{reader.path / layout.JOINT_LIST} is missing; --robot says nothing without joint angles"
+                f"{reader.path} has no joint angles ({layout.JOINT_LIST}, or JointState in a bag); "
+                "--robot says nothing without them"
             )
         return RecordedView(
             FrameView(reader.intrinsics, None, None),
