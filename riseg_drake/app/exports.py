@@ -80,7 +80,11 @@ class Exports:
             mask=mask,
             confidence=confidence,
         )
-        self._number += 1
+        with undisturbed():  # what is stopped has the same frames in all formats
+            self._number += 1
+            self._write(frame, segmentation)
+
+    def _write(self, frame: SegmentedFrame, segmentation: Segmentation) -> None:
         for export in self._exports:
             export.take(frame)
         if self._clouds is not None or self._motions is not None:
