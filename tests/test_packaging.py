@@ -98,6 +98,27 @@ def test_models_and_scenarios_are_installed_to_the_last_file(installed, tmp_path
     assert there
 
 
+def test_the_sample_and_the_template_of_the_report_are_installed_to_the_last_file(installed, tmp_path):
+    program = (
+        "from importlib.resources import files\n"
+        "from pathlib import Path\n"
+        "package = Path(str(files('riseg_drake')))\n"
+        "for path in [*(package / 'recording' / 'sample').rglob('*'), *(package / 'app').glob('*.jinja')]:\n"
+        "    if path.is_file():\n"
+        "        print('riseg_drake', path.relative_to(package).as_posix(), sep='/')\n"
+    )
+    there = set(run(installed / "python", "-c", program, cwd=tmp_path).split("\n")) - {""}
+    wanted = subprocess.run(
+        ["git", "ls-files", "riseg_drake/recording/sample", "riseg_drake/app/*.jinja"],
+        cwd=CHECKOUT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert there == set(wanted.stdout.split("\n")) - {""}
+    assert len(there) > 200
+
+
 def test_an_installed_copy_loads_its_scenario_and_its_models(installed, tmp_path):
     program = (
         "from riseg_drake.app.scenario import load_scenario\n"
