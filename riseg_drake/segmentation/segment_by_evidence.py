@@ -197,7 +197,7 @@ def _explained(
 ) -> tuple[Observation, Bodies]:
     """What a frame says, given some motions [C, 4, 4], and the bodies by it."""
     seen = observe(compared, belief.bond, belief.part, candidates_K, parameters.observation)
-    return bodies_of(belief, seen, before, parameters.belief)
+    return bodies_of(belief, seen, before, parameters.belief, parameters.observation)
 
 
 def _problem(belief: Belief, compared: Comparison, look: _Look) -> SearchProblem:
@@ -302,9 +302,10 @@ def _leaves_keyframe(now: Segmentation, bodies: Bodies, look: _Look) -> bool:
         return False
     p_C1Q = (rays(frame.intrinsics)[every] * frame.depth[every][..., None])[standing_there].astype(float)
     p_KQ = move_points(inverse(keyframe.frame.X_WC) @ frame.X_WC, p_C1Q)
-    covered = np.zeros(len(p_KQ), bool)
-    seen_there = keyframe.covered if now.still_since is not None else keyframe.covered | (keyframe.frame.depth > 0)
+    shown, covered = keyframe.covered, np.zeros(len(p_KQ), bool)
+    if now.still_since is None:
+        shown = shown | (keyframe.frame.depth > 0)
     for X in bodies.motions_K:
         (v, u), inside = (a.T for a in pixels_of(move_points(inverse(X), p_KQ), frame.intrinsics))
-        covered[inside] |= seen_there[v[inside], u[inside]]
+        covered[inside] |= shown[v[inside], u[inside]]
     return bool(np.mean(~covered) > look.parameters.uncovered)

@@ -227,6 +227,6 @@ def test_the_function_is_handed_the_frame_what_flowed_and_the_parameters(monkeyp
         memory.GetInputPort("flow_span").FixValue(context, [7.5])
         simulator.AdvanceTo(number * PERIOD + JUST_AFTER)
     expected = (parameters, camera_motion) if given else (FramePairParameters(), CameraMotionParameters())
-    # Nothing has flowed before there is a pair. A value with arrays has no equality: its distance says which it is.
+    # Nothing has flowed before there is a pair. Values with arrays have no equality: their distances tell.
     assert [above.distance for above, *_ in handed] == [0.0, 1.0]
     assert [others for _, *others in handed] == [[0.0, *expected], [7.5, *expected]]
