@@ -114,10 +114,10 @@ def bodies_of(
     """
     keyframe = belief.keyframe
     part = partition(keyframe, belief.bond + seen.evidence, parameters.partition, seen.nats)
-    a, b = part[keyframe.borders].T
-    of_parts = np.where(a != b, evidence_of_parts(seen, keyframe, part, observation), -np.inf)
-    if (of_parts > seen.evidence).any():
-        seen = replace(seen, evidence=np.maximum(seen.evidence, of_parts))
+    if keyframe.across.any():
+        # What lies about a gap says little of its motion; all of both pieces together may be sure of it.
+        of_parts = evidence_of_parts(seen, keyframe, part, observation)
+        seen = replace(seen, evidence=np.where(keyframe.across, of_parts, seen.evidence))
         part = partition(keyframe, belief.bond + seen.evidence, parameters.partition, seen.nats)
     seen = replace(seen, evidence=seen.evidence + apart(keyframe, part, seen.nats, parameters.partition))
     motion = motions_of_parts(part, seen.nats, parameters.partition)
