@@ -12,7 +12,7 @@ from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.border_prior import BorderPriorParameters, border_prior
 from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe
 from riseg_drake.segmentation.noise import MeasurementNoise
-from riseg_drake.segmentation.observation import Observation
+from riseg_drake.segmentation.observation import Observation, ObservationParameters, evidence_of_parts
 from riseg_drake.segmentation.partition import (
     PartitionParameters,
     apart,
@@ -105,6 +105,7 @@ def bodies_of(
     seen: Observation,
     before: Bodies | None,
     parameters: BeliefParameters,
+    observation: ObservationParameters,
 ) -> tuple[Observation, Bodies]:
     """The bodies, with what one frame says, and that with what the bodies' motions add to its evidence.
 
@@ -113,6 +114,11 @@ def bodies_of(
     """
     keyframe = belief.keyframe
     part = partition(keyframe, belief.bond + seen.evidence, parameters.partition, seen.nats)
+    if keyframe.across.any():
+        # What lies about a gap says little of its motion; all of both pieces together may be sure of it.
+        of_parts = evidence_of_parts(seen, keyframe, part, observation)
+        seen = replace(seen, evidence=np.where(keyframe.across, of_parts, seen.evidence))
+        part = partition(keyframe, belief.bond + seen.evidence, parameters.partition, seen.nats)
     seen = replace(seen, evidence=seen.evidence + apart(keyframe, part, seen.nats, parameters.partition))
     motion = motions_of_parts(part, seen.nats, parameters.partition)
     found_before = np.bincount(part, keyframe.area * (belief.body > 0), len(motion))
@@ -184,7 +190,9 @@ def next_belief(
     body = np.where(known, bodies.body[source], _most_seen(new, np.where(carried == 0, ids, 0)))
     prior = border_prior(new, parameters.prior)
     origin = Origin(source, body, moved=known & (bodies.motion[source] > 0))
-    evidence = carried_evidence(replace(belief, evidence=evidence), new, prior, origin, parameters)
+    evidence = carried_evidence(
+        replace(belief, evidence=evidence, body=bodies.body), new, prior, origin, parameters
+    )
     part = partition(new, prior + evidence, parameters.partition)
     return Belief(
         keyframe=new,
@@ -268,13 +276,25 @@ def carried_evidence(
     else:
         same_border, remembered = np.zeros(len(a), bool), np.zeros(len(a))
     stood = ((from_a < 0) ^ (from_b < 0)) & ~moved[a] & ~moved[b]
+    unlike = _between_bodies(old, new, body, -2 * parameters.inside)
     apart = np.where(
         body[a] == body[b],
-        np.where(body[a] > 0, parameters.inside / 2, 0),
-        np.where(stood, 0, -2 * parameters.inside),
+        # A gap in what is one body is one in the picture.
+        np.where(body[a] > 0, parameters.inside / 2 - np.where(new.across, new_prior, 0.0), 0),
+        np.where(stood, 0, unlike),
     )
     evidence = np.where(known & (from_a == from_b), parameters.inside, np.where(same_border, remembered, apart))
     return np.where(known | (body[a] > 0) | (body[b] > 0), evidence, 0.0)
+
+
+def _between_bodies(old: Belief, new: Keyframe, body: NDArray[np.intp], never: float) -> NDArray[np.float64]:
+    """[M], the mean evidence of all borders that both bodies of a new border had; `never` if they had none."""
+    pairs = np.sort(np.concatenate([old.body[old.keyframe.borders], body[new.borders]]), axis=1)
+    _, pair = np.unique(pairs, axis=0, return_inverse=True)
+    before, now = np.split(pair.ravel(), [len(old.evidence)])
+    length = np.bincount(before, old.keyframe.length, len(pairs))
+    total = np.bincount(before, old.keyframe.length * old.evidence, len(pairs))
+    return np.divide(total, length, out=np.full(len(pairs), never), where=length > 0)[now]
 
 
 def _carry(

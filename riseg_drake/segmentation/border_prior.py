@@ -41,11 +41,12 @@ _FAR = 4
 
 def border_prior(keyframe: Keyframe, parameters: BorderPriorParameters) -> NDArray[np.float64]:
     """[M], log-odds that the two sides of each border are one body, by the keyframe alone."""
-    cues = border_cues(keyframe)
+    cues, cut = border_cues(keyframe), keyframe.superpixels
     weight = np.array([parameters.dent, parameters.valley, parameters.color, parameters.hole], np.float64)
     odds = np.clip(parameters.smooth + cues @ weight, parameters.least, parameters.most)
     # Of what may go on behind something the still picture says nothing.
-    return np.where(keyframe.superpixels.behind, 0.0, odds)
+    odds = np.where(cut.across, parameters.least, odds)
+    return np.where(cut.behind, 0.0, odds)
 
 
 def border_cues(keyframe: Keyframe) -> NDArray[np.float64]:

@@ -17,6 +17,7 @@ from riseg_drake.segmentation.superpixels import (
     Superpixels,
     split_superpixels,
     superpixels,
+    with_gaps,
     with_occlusions,
 )
 from riseg_drake.segmentation.support import may_lie_on
@@ -38,6 +39,8 @@ class KeyframeParameters:
     """At most so many pixels sharpen motions."""
     behind: float = 0.012
     """m; surfaces on both sides of what is in front of them may be one if they are as high within that."""
+    gap: float = 0.02
+    """m; the widest gap across which two things that are seen may be one."""
 
 
 @dataclass(frozen=True)
@@ -77,8 +80,13 @@ class Keyframe(Immutable):
 
     @property
     def borders(self) -> NDArray[np.intp]:
-        """[M, 2], pairs of superpixels that touch, or may be one behind what is between them."""
+        """[M, 2], pairs of superpixels that touch, or may be one behind something or across a gap."""
         return self.superpixels.borders
+
+    @property
+    def across(self) -> NDArray[np.bool_]:
+        """[M], which of them lie across a gap."""
+        return self.superpixels.across
 
     @property
     def length(self) -> NDArray[np.float64]:
@@ -130,6 +138,7 @@ def make_keyframe(
         cut = split_superpixels(cut, bodies[region])
     height = cv2.medianBlur(height, 5)
     cut = with_occlusions(cut, height, parameters.behind)
+    cut = with_gaps(cut, parameters.gap * above.pixels_per_metre(frame.intrinsics))
     owner = np.full(above.mask.shape, -1, np.intp)
     owner[region] = cut.label
     variance = gray_variance(frame.gradient_squared, noise)

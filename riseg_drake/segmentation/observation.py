@@ -42,6 +42,8 @@ class ObservationParameters:
     """rho(k | k) of a motion: probability with which a thing pushes its neighbour along as if they were one."""
     carried: float = 0.5
     """The same where one of two may lie on the other: as often as not."""
+    across: float = 0.05
+    """The same across a gap: what does not touch is pushed along by a third thing at most."""
     stays: float = 0.8
     """rho(k | k) of standing still: with which the neighbour of what stands still stands still, too."""
     still_share: float = 0.5
@@ -68,6 +70,8 @@ class Observation(Immutable):
     """[M], log-odds that both sides of a border are one body."""
     span: NDArray[np.float64]
     """[N], pixels by which its motion moves a superpixel: how well it tells motions apart."""
+    share: NDArray[np.float64]
+    """[G], how common each motion is."""
 
 
 def observe(
@@ -106,14 +110,37 @@ def observe(
     q = motion_posterior(nats, share, parameters.outlier)
     focal_length, p_KQ = compared.frame.intrinsics.fx, keyframe.edges.p_C0Q[::10]
     spans = [flow_difference(p_KQ, X, np.eye(4), focal_length) if len(p_KQ) else 0.0 for X in motions_K[needed]]
-    along = np.where(keyframe.over, parameters.carried, parameters.along)
     return Observation(
         motions_K=motions_K[needed],
         motion=motion,
         nats=nats,
-        evidence=bond_evidence(q, share, keyframe.borders, parameters.stays, along),
+        evidence=_evidence(keyframe, q, share, parameters),
         span=np.array(spans)[motion],
+        share=share,
     )
+
+
+def evidence_of_parts(
+    seen: Observation, keyframe: Keyframe, part: NDArray[np.intp], parameters: ObservationParameters
+) -> NDArray[np.float64]:
+    """[M], log-odds that both sides of a border are one body, by all of the parts [N] that they belong to.
+
+    A superpixel of a blank thing says little of its motion, all of them together may be sure of it.
+    """
+    nats = np.array([np.bincount(part, n) for n in seen.nats])
+    q = motion_posterior(nats, seen.share, parameters.outlier)
+    return _evidence(keyframe, q[:, part], seen.share, parameters)
+
+
+def _evidence(
+    keyframe: Keyframe, q: NDArray[np.float64], share: NDArray[np.float64], parameters: ObservationParameters
+) -> NDArray[np.float64]:
+    """[M], by how likely each motion is each superpixel's own [G, N] and how common each is [G]."""
+    along = np.where(keyframe.over, parameters.carried, parameters.along)
+    along[keyframe.across] = parameters.across
+    # That what does not touch stands still says nothing.
+    stays = np.where(keyframe.across, 1.0, parameters.stays)
+    return bond_evidence(q, share, keyframe.borders, stays, along)
 
 
 def motion_price(compared: Comparison, parameters: ObservationParameters) -> float:
@@ -151,7 +178,7 @@ def bond_evidence(
     q: NDArray[np.float64],
     share: NDArray[np.float64],
     borders: NDArray[np.intp],
-    stays: float,
+    stays: float | NDArray[np.float64],
     along: float | NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """[M], log-odds that both sides of borders [M, 2] are one body, as above.

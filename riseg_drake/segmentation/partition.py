@@ -47,8 +47,13 @@ def partition(
     part = multicut(keyframe.count, keyframe.borders, weight, nats, parameters.rigid_min)
     if nats is not None and len(nats) > 1:
         part = redrawn(part, keyframe.borders, weight, nats, parameters)
+    joins = ~keyframe.across | (weight > 0)
     return _without_small(
-        part, keyframe.borders, weight, keyframe.area, parameters.area_min * keyframe.pixels_per_metre**2
+        part,
+        keyframe.borders[joins],
+        weight[joins],
+        keyframe.area,
+        parameters.area_min * keyframe.pixels_per_metre**2,
     )
 
 

@@ -148,7 +148,7 @@ def segment_by_evidence(
         seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters)
         deciding = _has_gone_far(now, look, seen, bodies)
     # What the next keyframe cannot be compared with any more is looked for now.
-    leaves = bool(above_1.mask.any()) and _leaves_keyframe(belief, bodies, look)
+    leaves = bool(above_1.mask.any()) and _leaves_keyframe(now, bodies, look)
     deciding |= leaves
     if deciding:
         candidates_K = search_motions(_problem(belief, compared, look), candidates_K)
@@ -197,7 +197,7 @@ def _explained(
 ) -> tuple[Observation, Bodies]:
     """What a frame says, given some motions [C, 4, 4], and the bodies by it."""
     seen = observe(compared, belief.bond, belief.part, candidates_K, parameters.observation)
-    return bodies_of(belief, seen, before, parameters.belief)
+    return bodies_of(belief, seen, before, parameters.belief, parameters.observation)
 
 
 def _problem(belief: Belief, compared: Comparison, look: _Look) -> SearchProblem:
@@ -289,19 +289,23 @@ def _share_in_view(belief: Belief, bodies: Bodies, frame: Frame) -> float:
     return shown / max(1.0, len(p_KQ) * float(measured))
 
 
-def _leaves_keyframe(belief: Belief, bodies: Bodies, look: _Look) -> bool:
+def _leaves_keyframe(now: Segmentation, bodies: Bodies, look: _Look) -> bool:
     """Whether too much of what stands there was not to be seen in the keyframe, which shows hardly more than
-    this frame: a camera that is too near to measure most of it will be back."""
+    this frame: a camera that is too near to measure most of it will be back. What stands, in motion, where the
+    keyframe saw nothing has moved there: the next rest says how."""
+    assert now.belief is not None
     frame, every = look.frame, (slice(2, None, 6), slice(2, None, 6))
     standing_there = look.above.mask[every] & (frame.depth[every] > 0)
-    keyframe = belief.keyframe
+    keyframe = now.belief.keyframe
     in_keyframe = keyframe.frame.depth[every][keyframe.above.mask[every]]
     if (frame.depth[every][standing_there] ** 2).sum() <= _AS_MUCH * (in_keyframe**2).sum():
         return False
     p_C1Q = (rays(frame.intrinsics)[every] * frame.depth[every][..., None])[standing_there].astype(float)
     p_KQ = move_points(inverse(keyframe.frame.X_WC) @ frame.X_WC, p_C1Q)
-    covered = np.zeros(len(p_KQ), bool)
+    shown, covered = keyframe.covered, np.zeros(len(p_KQ), bool)
+    if now.still_since is None:
+        shown = shown | (keyframe.frame.depth > 0)
     for X in bodies.motions_K:
         (v, u), inside = (a.T for a in pixels_of(move_points(inverse(X), p_KQ), frame.intrinsics))
-        covered[inside] |= keyframe.covered[v[inside], u[inside]]
+        covered[inside] |= shown[v[inside], u[inside]]
     return bool(np.mean(~covered) > look.parameters.uncovered)

@@ -30,6 +30,8 @@ class Superpixels:
     """[M], pixels along each border."""
     behind: NDArray[np.bool_]
     """[M], which of them lie behind something: their sides do not touch."""
+    across: NDArray[np.bool_]
+    """[M], which of them lie across a gap, in which nothing seems to stand."""
 
 
 def superpixels(
@@ -94,7 +96,8 @@ def _with_borders(label: NDArray[np.intp], count: int) -> Superpixels:
         length += np.bincount(low * count + high, minlength=size)
     code = np.flatnonzero(length)
     borders = np.stack(np.divmod(code, max(count, 1)), axis=1)
-    return Superpixels(label, count, borders, length[code], np.zeros(len(code), bool))
+    touch = np.zeros(len(code), bool)
+    return Superpixels(label, count, borders, length[code], behind=touch, across=touch)
 
 
 def with_occlusions(cut: Superpixels, height: NDArray[np.float32], level: float) -> Superpixels:
@@ -103,14 +106,41 @@ def with_occlusions(cut: Superpixels, height: NDArray[np.float32], level: float)
     `height` [H, W], m above the table; surfaces on both sides are as high as each other within `level`, m.
     """
     pairs, width = seen_in_pieces(cut.label, height, level)
+    return _with_more(cut, pairs, width, across=False)
+
+
+def with_gaps(cut: Superpixels, widest: float) -> Superpixels:
+    """The superpixels, with borders across gaps at most so many pixels wide between what is not connected.
+
+    What is low, thin or dark is seen in pieces, as depth errs and has holes.
+    """
+    inside = cut.label >= 0
+    _, island = cv2.connectedComponents(inside.view(np.uint8), connectivity=8)
+    if island.max(initial=0) < 2:
+        return cut
+    nearest, distance = nearest_values(np.where(inside, cut.label, -1), inside)
+    near = np.where(distance < widest / 2, nearest, -1)
+    beyond = _with_borders(near, cut.count)
+    of = np.zeros(cut.count, np.intp)
+    of[cut.label[inside]] = island[inside]
+    parted = of[beyond.borders[:, 0]] != of[beyond.borders[:, 1]]
+    return _with_more(cut, beyond.borders[parted], beyond.length[parted], across=True)
+
+
+def _with_more(
+    cut: Superpixels, pairs: NDArray[np.intp], length: NDArray[np.float64], *, across: bool
+) -> Superpixels:
+    """Borders between pairs [P, 2] beside those that are known, behind something or across a gap."""
     code, known = (p[:, 0] * cut.count + p[:, 1] for p in (pairs, cut.borders))
     new = ~np.isin(code, known)
     order = np.argsort(np.concatenate([known, code[new]]), kind="stable")
+    kind = np.full(np.count_nonzero(new), across)
     return replace(
         cut,
         borders=np.concatenate([cut.borders, pairs[new]])[order],
-        length=np.concatenate([cut.length, width[new]])[order],
-        behind=np.concatenate([cut.behind, np.ones(np.count_nonzero(new), bool)])[order],
+        length=np.concatenate([cut.length, length[new]])[order],
+        behind=np.concatenate([cut.behind, ~kind])[order],
+        across=np.concatenate([cut.across, kind])[order],
     )
 
 

@@ -40,15 +40,47 @@ def test_how_bodies_had_moved_when_the_reference_was_taken_is_told_since_the_new
         np.testing.assert_allclose(X, np.eye(4), atol=1e-12)
 
 
+def carried(old_borders, old_evidence, old_body, new_borders, origin, prior=2.0, across=None, length=None):
+    """Evidence for new borders; 4 nats would be against what never met, 1 for what was one body."""
+    keyframe = SimpleNamespace(
+        borders=np.array(old_borders),
+        count=len(old_body),
+        length=np.ones(len(old_borders)) if length is None else np.array(length),
+    )
+    evidence = np.array(old_evidence, float)
+    was = np.full(len(evidence), 2.0)
+    old = SimpleNamespace(keyframe=keyframe, prior=was, evidence=evidence, body=old_body)
+    across = np.zeros(len(new_borders), bool) if across is None else np.array(across)
+    new = SimpleNamespace(borders=np.array(new_borders), across=across)
+    return carried_evidence(old, new, np.full(len(new_borders), prior), origin, BeliefParameters(inside=2.0))
+
+
 def test_what_a_body_uncovers_is_not_that_body_and_may_be_one_that_stood_beside_it():
     # 0 moved, 1 stood, 2 has never moved, 3 and 4 are uncovered.
-    borders = np.array([[0, 1], [0, 3], [1, 3], [2, 3], [3, 4]])
-    new = SimpleNamespace(borders=borders)
-    keyframe = SimpleNamespace(borders=np.array([[0, 1]]), count=3)
-    old = SimpleNamespace(keyframe=keyframe, prior=np.array([2.0]), evidence=np.array([-7.0]))
-    origin = Origin(source=np.array([0, 1, 2, -1, -1]), body=np.array([5, 6, 0, 0, 0]), moved=np.arange(5) == 0)
-    evidence = carried_evidence(old, new, np.full(5, 2.0), origin, BeliefParameters(inside=2.0))
+    borders = [[0, 1], [0, 3], [1, 3], [2, 3], [3, 4]]
+    body = np.array([5, 6, 0, 0, 0])
+    origin = Origin(source=np.array([0, 1, 2, -1, -1]), body=body, moved=np.arange(5) == 0)
+    evidence = carried([[0, 1]], [-7.0], body[:3], borders, origin)
     assert evidence == pytest.approx([-7.0, -4.0, 0.0, 0.0, 0.0])
+
+
+def test_of_two_bodies_all_that_was_seen_between_them_is_remembered_wherever_they_meet_now():
+    # 0 and 1 were the body 5, 2 and 3 the body 6; what meets now are the ends that did not touch, 0 and 3.
+    body = np.array([5, 5, 6, 6])
+    origin = Origin(source=np.arange(4), body=body, moved=np.ones(4, bool))
+    met = [[0, 1], [0, 2], [1, 2], [2, 3]]
+    evidence = carried(met, [1.0, -1.0, 0.5, 1.0], body, [[0, 3]], origin, length=[1.0, 1.0, 3.0, 1.0])
+    assert evidence == pytest.approx([(1 * -1.0 + 3 * 0.5) / 4])
+    # Bodies that were never near each other are two.
+    never = carried([[0, 1], [2, 3]], [1.0, 1.0], body, [[0, 3], [1, 2]], origin, across=[False, True])
+    assert never == pytest.approx([-4.0, -4.0])
+
+
+def test_a_gap_that_opens_in_the_picture_of_one_body_does_not_speak_against_it():
+    body = np.array([5, 5, 5])
+    origin = Origin(source=np.array([0, -1, -1]), body=body, moved=np.ones(3, bool))
+    evidence = carried([[0, 1], [1, 2]], [1.0, 1.0], body, [[0, 1], [0, 2]], origin, -1.5, [True, False])
+    assert evidence + -1.5 == pytest.approx([1.0, -0.5])
 
 
 def test_what_is_uncovered_takes_the_id_of_most_of_its_part_and_what_was_known_keeps_its_own():

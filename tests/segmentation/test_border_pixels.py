@@ -10,7 +10,7 @@ from riseg_drake.segmentation.superpixels import Superpixels
 #   . 2 2
 LABEL = np.array([[0, 0, 1], [0, 2, 1], [-1, 2, 2]])
 BORDERS = np.array([[0, 1], [0, 2], [1, 2]])
-CUT = Superpixels(LABEL, 3, BORDERS, np.ones(3), np.zeros(3, bool))
+CUT = Superpixels(LABEL, 3, BORDERS, np.ones(3), np.zeros(3, bool), np.zeros(3, bool))
 
 
 def test_every_place_at_which_two_superpixels_touch_is_listed_once_with_its_border():

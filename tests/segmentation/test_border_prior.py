@@ -11,12 +11,17 @@ from riseg_drake.segmentation.superpixels import Superpixels
 
 
 def two_halves(
-    height: np.ndarray, color: np.ndarray, depth: np.ndarray | None = None, *, behind: bool = False
+    height: np.ndarray,
+    color: np.ndarray,
+    depth: np.ndarray | None = None,
+    *,
+    behind: bool = False,
+    across: bool = False,
 ) -> SimpleNamespace:
     """40 x 40 pixels, cut in the middle from top to bottom."""
     label = np.zeros((40, 40), np.intp)
     label[:, 20:] = 1
-    cut = Superpixels(label, 2, np.array([[0, 1]]), np.array([40.0]), np.array([behind]))
+    cut = Superpixels(label, 2, np.array([[0, 1]]), np.array([40.0]), np.array([behind]), np.array([across]))
     return SimpleNamespace(
         region=(slice(0, 40), slice(0, 40)),
         count=2,
@@ -102,6 +107,11 @@ def test_mirroring_the_picture_changes_nothing():
     one = border_cues(two_halves(height, color))
     other = border_cues(two_halves(height[:, ::-1].copy(), color[:, ::-1].copy()))
     np.testing.assert_allclose(one, other, rtol=1e-5)
+
+
+def test_across_a_gap_the_picture_says_as_much_as_it_may_that_two_are_two():
+    given = BorderPriorParameters(least=-1.25)
+    assert border_prior(two_halves(FLAT, GRAY, across=True), given) == pytest.approx([-1.25])
 
 
 def test_the_picture_says_nothing_of_what_may_go_on_behind_something():

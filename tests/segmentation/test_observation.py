@@ -12,6 +12,7 @@ from riseg_drake.segmentation.observation import (
     ObservationParameters,
     _fewest_motions,
     bond_evidence,
+    evidence_of_parts,
     motion_posterior,
     motion_price,
     observe,
@@ -43,6 +44,40 @@ def test_what_may_lie_on_its_neighbour_tells_less_by_going_with_it_and_as_much_b
     together = bond_evidence(moves, SHARE, borders, STAYS, along)
     assert together == pytest.approx(np.log([1 / 0.1, 1 / 0.6]))
     assert bond_evidence(still, SHARE, borders, STAYS, along) == pytest.approx([np.log(1 / STAYS)] * 2)
+
+
+CERTAIN = ObservationParameters(outlier=0.0)
+
+
+def parts_beside_each_other(nats, *, across=False, over=False, given=CERTAIN):
+    """Two parts, 0 and 1, of four superpixels in a row, with costs [G, 4]: what they say of each border."""
+    keyframe = SimpleNamespace(
+        borders=np.array([[0, 1], [1, 2], [2, 3]]), across=np.full(3, across), over=np.full(3, over)
+    )
+    seen = SimpleNamespace(nats=np.array(nats), share=SHARE)
+    return evidence_of_parts(seen, keyframe, np.array([0, 0, 1, 1]), given)
+
+
+@pytest.mark.parametrize(("kind", "probability"), [({}, 0.3), ({"over": True}, 0.6), ({"across": True}, 0.01)])
+def test_two_parts_that_surely_moved_as_one_are_so_by_what_else_would_have_moved_them_so(kind, probability):
+    moved = np.array([[40.0] * 4, [0.0] * 4])
+    given = ObservationParameters(outlier=0.0, along=0.3, carried=0.6, across=0.01)
+    evidence = parts_beside_each_other(moved, **kind, given=given)
+    assert evidence[1] == pytest.approx(np.log(1 / probability))
+
+
+def test_two_parts_that_stand_still_across_a_gap_say_nothing_of_each_other():
+    still = np.array([[0.0] * 4, [40.0] * 4])
+    assert parts_beside_each_other(still, across=True) == pytest.approx(0.0)
+    assert parts_beside_each_other(still)[1] == pytest.approx(np.log(1 / 0.8))
+
+
+def test_superpixels_that_each_say_little_of_their_motion_are_sure_of_it_as_a_part():
+    little = np.array([[3.0, 2.0, 1.0, 4.0], [0.0] * 4])
+    q = motion_posterior(np.array([[5.0, 5.0], [0.0, 0.0]]), SHARE, outlier=0.0)
+    assert parts_beside_each_other(little)[1] == pytest.approx(
+        bond_evidence(q, SHARE, np.array([[0, 1]]), 0.8, 0.2)
+    )
 
 
 def test_evidence_is_the_formula_s_for_all_pairs_of_motions():

@@ -67,11 +67,11 @@ def test_superpixels_that_touch_keep_their_border_and_the_others_get_one() -> No
     # The two outer ones touch at the bottom.
     label[16:, 10:15], label[16:, 15:20], height[16:] = 0, 2, 0.02
     touching = Superpixels(
-        label, 3, np.array([[0, 1], [0, 2], [1, 2]]), np.array([21.0, 4.0, 21.0]), np.zeros(3, bool)
+        label, 3, np.array([[0, 1], [0, 2], [1, 2]]), np.array([21.0, 4.0, 21.0]), *np.zeros((2, 3), bool)
     )
     np.testing.assert_array_equal(with_occlusions(touching, height, LEVEL).behind, [False] * 3)
     np.testing.assert_array_equal(with_occlusions(touching, height, LEVEL).length, touching.length)
-    apart = Superpixels(label, 3, np.array([[0, 1], [1, 2]]), np.array([21.0, 21.0]), np.zeros(2, bool))
+    apart = Superpixels(label, 3, np.array([[0, 1], [1, 2]]), np.array([21.0, 21.0]), *np.zeros((2, 2), bool))
     joined = with_occlusions(apart, height, LEVEL)
     np.testing.assert_array_equal(joined.borders, [[0, 1], [0, 2], [1, 2]])
     np.testing.assert_array_equal(joined.length, [21, 16, 21])

@@ -23,6 +23,7 @@ class Row:
     borders: np.ndarray = field(default_factory=lambda: np.array([[0, 1], [1, 2], [2, 3], [3, 4]]))
     length: np.ndarray = field(default_factory=lambda: np.ones(4))
     area: np.ndarray = field(default_factory=lambda: np.full(5, 10))
+    across: np.ndarray = field(default_factory=lambda: np.zeros(4, bool))
 
     @property
     def pixels_per_metre(self) -> float:
@@ -42,6 +43,14 @@ def test_what_is_too_small_joins_the_neighbour_it_is_bound_to_most():
     bond = np.array([3.0, -2.0, -1.0, 3.0])
     np.testing.assert_array_equal(partition(Row(least=10), bond, PartitionParameters()), [0, 0, 1, 2, 2])
     np.testing.assert_array_equal(partition(Row(least=11), bond, PartitionParameters()), [0, 0, 1, 1, 1])
+
+
+@pytest.mark.parametrize(("bond", "part"), [(-1.0, 1), (0.1, 0)])
+def test_what_is_too_small_stays_alone_across_a_gap_unless_something_says_that_both_are_one(bond, part):
+    row = Row(least=11, across=np.array([False, False, False, True]))
+    np.testing.assert_array_equal(
+        partition(row, np.array([3.0, 3.0, 3.0, bond]), PartitionParameters()), [0, 0, 0, 0, part]
+    )
 
 
 def test_small_parts_grow_until_they_are_large_enough():

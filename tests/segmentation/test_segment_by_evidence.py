@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from riseg_drake.segmentation.algorithm import SegmentObjsParameters
 from tests.segmentation.drawn_scene import (
     Blank,
     DrawnScene,
@@ -126,3 +127,23 @@ def test_of_boxes_that_stand_flush_the_one_that_is_pushed_has_an_id_before_any_r
         assert segmentation.belief.keyframe.frame.sequence == 0
         if sequence >= 2:  # from 1.5 pixels on
             assert intersection_over_union(segmentation.mask > 0, label == 2) > 0.93
+
+
+def test_a_thing_that_leaves_its_place_unseen_in_motion_is_no_reason_to_decide_before_it_rests() -> None:
+    # No motion is proposed by groups or searched for: the rest alone says where the box went.
+    parameters = SegmentObjsParameters()
+    parameters.segment.evidence.search_every = 1e3
+    parameters.bfif.grouping.members_min = 100_000
+    scene = DrawnScene([(0.03, 0.05, 0.03), (0.03, 0.05, 0.04)])
+    watcher, rng = Watcher(bfif=parameters.bfif, segment=parameters.segment), np.random.default_rng(0)
+    keyframes = []
+    for sequence, y in enumerate([0.0, 0.0, *np.arange(1, 10) * 0.003, *[0.027] * 5]):
+        camera = looking_down(0.5 * y if sequence < 9 else 0.0)
+        frame, label = scene.frame(sequence, camera, [planar(-0.05 - y, 0.0), planar(0.05 + y, 0.0)], rng)
+        segmentation = watcher.take(frame).segmentation
+        keyframes.append(segmentation.belief.keyframe.frame.sequence)
+    assert keyframes[:11] == [0] * 11
+    assert keyframes[-1] > 0
+    for i in (1, 2):
+        ids = np.unique(segmentation.mask[label == i])
+        assert intersection_over_union(segmentation.mask == ids.max(), label == i) > 0.95

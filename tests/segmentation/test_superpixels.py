@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from riseg_drake.segmentation.superpixels import Superpixels, superpixels
+from riseg_drake.segmentation.superpixels import Superpixels, superpixels, with_gaps
 from tests.segmentation.drawn_scene import Texture
 
 HEIGHT, WIDTH = 60, 80
@@ -97,6 +97,25 @@ def test_two_halves_share_one_border_of_the_images_height() -> None:
     pieces = cut(color, np.ones((20, 40), bool), 20)
     np.testing.assert_array_equal(pieces.borders, [[0, 1]])
     assert pieces.length[0] == pytest.approx(20, abs=2)
+
+
+@pytest.mark.parametrize(("gap", "widest", "known"), [(10, 10.5, True), (10, 9.5, False), (4, 10.5, True)])
+def test_what_is_seen_in_pieces_has_a_border_across_a_gap_no_wider_than_asked(gap, widest, known) -> None:
+    label = np.full((40, 60), -1)
+    label[:, 10:20], label[:, 20 + gap : 40] = 0, 1
+    apart = Superpixels(label, 2, np.zeros((0, 2), int), np.zeros(0), *np.zeros((2, 0), bool))
+    joined = with_gaps(apart, widest)
+    np.testing.assert_array_equal(joined.borders, np.tile([0, 1], (known, 1)))
+    np.testing.assert_array_equal(joined.length, [40] * known)
+    np.testing.assert_array_equal(joined.across, [True] * known)
+    assert not joined.behind.any()
+
+
+def test_two_arms_of_one_piece_have_no_border_across_the_gap_between_them() -> None:
+    label = np.full((40, 60), -1)
+    label[:, 10:20], label[:, 25:35], label[30:, 20:25] = 0, 1, 2
+    horseshoe = Superpixels(label, 3, np.array([[0, 2], [1, 2]]), np.full(2, 10.0), *np.zeros((2, 2), bool))
+    assert not with_gaps(horseshoe, 20.0).across.any()
 
 
 @pytest.mark.parametrize("size", [3, 6, 15])

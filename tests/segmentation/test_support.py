@@ -19,9 +19,8 @@ def cut(label: np.ndarray) -> Superpixels:
         if a != b and min(a, b) >= 0
     }
     borders = np.array(sorted(pairs)).reshape(-1, 2)
-    return Superpixels(
-        label, int(label.max()) + 1, borders, np.ones(len(borders)), np.zeros(len(borders), bool)
-    )
+    touch = np.zeros(len(borders), bool)
+    return Superpixels(label, int(label.max()) + 1, borders, np.ones(len(borders)), touch, touch)
 
 
 def halves_with(height_0: float, height_1: float) -> np.ndarray:
