@@ -36,6 +36,7 @@ WITHOUT: dict[str, Switch] = {
         f"segment.evidence.belief.prior.{cue}": 0.0 for cue in ("dent", "valley", "color", "hole")
     },
     "no borders behind what is in front": {"segment.evidence.belief.keyframe.behind": 0.0},
+    "no borders across gaps": {"segment.evidence.belief.keyframe.gap": 0.0},
     "no evidence kept from one rest to the next": {"segment.evidence.belief.most": 0.0},
     "no memory of what left the view": {"segment.evidence.memory": False},
 }
