@@ -276,7 +276,10 @@ def carried_evidence(
     else:
         same_border, remembered = np.zeros(len(a), bool), np.zeros(len(a))
     stood = ((from_a < 0) ^ (from_b < 0)) & ~moved[a] & ~moved[b]
-    unlike = _between_bodies(old, new, body, -2 * parameters.inside)
+    # What has parted is two, and so is what may lie on the other and goes along with it; what was told apart by
+    # less is as much two as all that was seen between them says.
+    two, between = -2 * parameters.inside, _between_bodies(old, new, body)
+    unlike = np.where((between > -parameters.inside) & ~new.over, between, two)
     apart = np.where(
         body[a] == body[b],
         # A gap in what is one body is one in the picture.
@@ -287,14 +290,14 @@ def carried_evidence(
     return np.where(known | (body[a] > 0) | (body[b] > 0), evidence, 0.0)
 
 
-def _between_bodies(old: Belief, new: Keyframe, body: NDArray[np.intp], never: float) -> NDArray[np.float64]:
-    """[M], the mean evidence of all borders that both bodies of a new border had; `never` if they had none."""
+def _between_bodies(old: Belief, new: Keyframe, body: NDArray[np.intp]) -> NDArray[np.float64]:
+    """[M], the mean evidence of all borders that both bodies of a new border had; -inf if they had none."""
     pairs = np.sort(np.concatenate([old.body[old.keyframe.borders], body[new.borders]]), axis=1)
     _, pair = np.unique(pairs, axis=0, return_inverse=True)
     before, now = np.split(pair.ravel(), [len(old.evidence)])
     length = np.bincount(before, old.keyframe.length, len(pairs))
     total = np.bincount(before, old.keyframe.length * old.evidence, len(pairs))
-    return np.divide(total, length, out=np.full(len(pairs), never), where=length > 0)[now]
+    return np.divide(total, length, out=np.full(len(pairs), -np.inf), where=length > 0)[now]
 
 
 def _carry(

@@ -40,7 +40,9 @@ def test_how_bodies_had_moved_when_the_reference_was_taken_is_told_since_the_new
         np.testing.assert_allclose(X, np.eye(4), atol=1e-12)
 
 
-def carried(old_borders, old_evidence, old_body, new_borders, origin, prior=2.0, across=None, length=None):
+def carried(
+    old_borders, old_evidence, old_body, new_borders, origin, prior=2.0, across=None, length=None, over=False
+):
     """Evidence for new borders; 4 nats would be against what never met, 1 for what was one body."""
     keyframe = SimpleNamespace(
         borders=np.array(old_borders),
@@ -51,7 +53,7 @@ def carried(old_borders, old_evidence, old_body, new_borders, origin, prior=2.0,
     was = np.full(len(evidence), 2.0)
     old = SimpleNamespace(keyframe=keyframe, prior=was, evidence=evidence, body=old_body)
     across = np.zeros(len(new_borders), bool) if across is None else np.array(across)
-    new = SimpleNamespace(borders=np.array(new_borders), across=across)
+    new = SimpleNamespace(borders=np.array(new_borders), across=across, over=np.full(len(across), over))
     return carried_evidence(old, new, np.full(len(new_borders), prior), origin, BeliefParameters(inside=2.0))
 
 
@@ -71,6 +73,10 @@ def test_of_two_bodies_all_that_was_seen_between_them_is_remembered_wherever_the
     met = [[0, 1], [0, 2], [1, 2], [2, 3]]
     evidence = carried(met, [1.0, -1.0, 0.5, 1.0], body, [[0, 3]], origin, length=[1.0, 1.0, 3.0, 1.0])
     assert evidence == pytest.approx([(1 * -1.0 + 3 * 0.5) / 4])
+    # What has parted is two, and so is what may lie on the other.
+    parted = carried(met, [1.0, -3.0, -1.8, 1.0], body, [[0, 3]], origin, length=[1.0, 1.0, 3.0, 1.0])
+    assert parted == pytest.approx([-4.0])
+    assert carried(met, [1.0, -1.0, 0.5, 1.0], body, [[0, 3]], origin, over=True) == pytest.approx([-4.0])
     # Bodies that were never near each other are two.
     never = carried([[0, 1], [2, 3]], [1.0, 1.0], body, [[0, 3], [1, 2]], origin, across=[False, True])
     assert never == pytest.approx([-4.0, -4.0])
