@@ -39,7 +39,7 @@ class KeyframeParameters:
     """At most so many pixels sharpen motions."""
     behind: float = 0.012
     """m; surfaces on both sides of what is in front of them may be one if they are as high within that."""
-    gap: float = 0.02
+    gap: float = 0.01
     """m; the widest gap across which two things that are seen may be one."""
 
 

@@ -49,7 +49,7 @@ def of_that_robot(words: list[str]) -> list[str] | None:
 
     None for bags, of which there are none.
     """
-    if words[1].startswith("pushes"):
+    if words[1:] and words[1].startswith("pushes"):
         return None
     return [ROBOT_RECORDING if "--robot" in words and word == "my_recording" else word for word in words]
 
