@@ -43,7 +43,7 @@ class BopExport:
             (self._scene / part).mkdir(parents=True, exist_ok=True)
         write_png(self._scene / "depth" / f"{frame.stem}.png", depth_to_millimetres(frame.depth))
         info = []
-        for k, object_id in enumerate(frame.ids):
+        for k, object_id in enumerate(frame.object_ids):
             mine = frame.mask == object_id
             write_png(self._scene / "mask_visib" / f"{frame.stem}_{k:06d}.png", mine.astype(np.uint8) * 255)
             info.append({"bbox_visib": bounding_box(mine), "px_count_visib": int(np.count_nonzero(mine))})
@@ -55,7 +55,7 @@ class BopExport:
             "cam_R_w2c": X_CW[:3, :3].ravel().tolist(),
             "cam_t_w2c": (1e3 * X_CW[:3, 3]).tolist(),
         }
-        self._objects[key] = [{"obj_id": object_id} for object_id in frame.ids]
+        self._objects[key] = [{"obj_id": object_id} for object_id in frame.object_ids]
         self._info[key] = info
         self._intrinsics = {**asdict(frame.intrinsics), "depth_scale": DEPTH_SCALE}
 

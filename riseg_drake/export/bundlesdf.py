@@ -32,7 +32,7 @@ class BundleSdfExport:
     def take(self, frame: SegmentedFrame) -> None:
         """Write one frame for each object that it shows."""
         first: Path | None = None
-        for object_id in frame.ids:
+        for object_id in frame.object_ids:
             folder = self._folder / f"object_{object_id}"
             if object_id not in self._begun:
                 self._begin(folder, frame)

@@ -93,7 +93,7 @@ class CloudExport:
             displacement: by id, the motion in W [4, 4] since the first pose; none where it is not known.
             rest_since: time since which nothing moves and the mask is decided, s; None in motion.
         """
-        points = {a: _points(frame, a) for a in frame.ids}
+        points = {a: _points(frame, a) for a in frame.object_ids}
         for a, (p_WQ, color) in points.items():
             known = a in displacement
             there = self._objects.get(a)

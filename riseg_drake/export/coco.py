@@ -46,7 +46,7 @@ class CocoExport:
                 "time_s": frame.time,
             }
         )
-        for object_id in frame.ids:
+        for object_id in frame.object_ids:
             rle = self._mask_api.encode(np.asfortranarray(frame.mask == object_id, dtype=np.uint8))
             self._annotations.append(
                 {

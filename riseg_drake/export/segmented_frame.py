@@ -32,7 +32,7 @@ class SegmentedFrame:
     """Of each id the probability that it is one object and all of it."""
 
     @property
-    def ids(self) -> list[int]:
+    def object_ids(self) -> list[int]:
         """Those that the mask shows, rising."""
         return [int(a) for a in np.unique(self.mask[self.mask > 0])]
 

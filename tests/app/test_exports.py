@@ -52,6 +52,7 @@ def masks(output):
     return [cv2.imread(str(p), cv2.IMREAD_UNCHANGED) for p in sorted((output / "mask").iterdir())]
 
 
+@pytest.mark.filterwarnings("ignore:__array__ implementation")  # pycocotools' own, when it decodes
 def test_every_format_has_the_masks_that_the_command_wrote(exported):
     export, there = exported / "export", masks(exported)
     assert {path.name for path in export.iterdir()} == set(FORMATS)

@@ -19,6 +19,7 @@ def file(tmp_path):
     return tmp_path / "coco" / "annotations.json"
 
 
+@pytest.mark.filterwarnings("ignore:__array__ implementation")  # pycocotools' own, when it decodes
 def test_pycocotools_reads_back_every_mask_to_the_pixel_under_its_id(file):
     coco = COCO(str(file))
     assert [image["file_name"] for image in coco.dataset["images"]] == [frame.name for frame in FRAMES]

@@ -39,7 +39,7 @@ def test_what_was_written_is_read_back_as_h264_of_eight_bits_with_every_frame_an
         assert (stream.codec_context.name, stream.codec_context.pix_fmt) == ("h264", "yuv420p")
         assert (stream.height, stream.width) == (62, 84)  # one more, for the codec wants even sides
         frames = list(file.decode(video=0))
-    assert len(frames) == len(shown) == stream.frames
+        assert len(frames) == len(shown) == stream.frames
     assert [frame.pts * frame.time_base for frame in frames] == [Fraction(k, 15) for k in range(9)]
 
 
