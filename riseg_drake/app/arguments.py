@@ -5,9 +5,11 @@ from pathlib import Path
 
 from riseg_drake.app import commands
 from riseg_drake.app.export_options import add_export
-from riseg_drake.app.options import add_overwrite, add_scenario, add_source, add_wait, positive, seed_number
+from riseg_drake.app.options import add_overwrite, add_scenario, add_source, add_view, positive, seed_number
 from riseg_drake.app.package import package_version
 from riseg_drake.app.parser import Parser
+
+_HARDWARE = "the built-in hardware.yaml"
 
 
 def command_line() -> argparse.ArgumentParser:
@@ -32,14 +34,8 @@ def command_line() -> argparse.ArgumentParser:
     run.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/SCENARIO_seed_N)")
     add_overwrite(run, "run")
     run.add_argument("--record", action="store_true", help="also write every frame to DIR/recording")
-    run.add_argument(
-        "--meshcat",
-        action=argparse.BooleanOptionalAction,
-        default=False,
-        help="show it in the browser and save the replay as DIR/replay.html (no)",
-    )
+    add_view(run)
     add_export(run)
-    add_wait(run)
 
     evaluate = _add(
         subparsers,
@@ -99,19 +95,11 @@ def command_line() -> argparse.ArgumentParser:
         "The same on a real Panda with a RealSense camera, over their drivers on LCM; see docs/hardware.md.\n"
         "The operator confirms every push; --dry-run shows pushes and moves nothing.",
     )
-    hardware.add_argument(
-        "scenario", type=Path, nargs="?", metavar="SCENARIO", help="a YAML file (the built-in hardware.yaml)"
-    )
+    add_scenario(hardware, built_in=_HARDWARE)
     hardware.add_argument("--seed", type=seed_number, default=0, metavar="N", help="draws samples (0)")
     hardware.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/SCENARIO_TIME)")
     hardware.add_argument("--record", action="store_true", help="also write every frame to DIR/recording")
-    hardware.add_argument(
-        "--meshcat",
-        action=argparse.BooleanOptionalAction,
-        default=False,
-        help="show it in the browser and save the replay as DIR/replay.html (no)",
-    )
-    add_wait(hardware)
+    add_view(hardware)
     hardware.add_argument(
         "--dry-run", action="store_true", help="show every planned push in the browser, and move nothing"
     )
@@ -133,9 +121,7 @@ def command_line() -> argparse.ArgumentParser:
         "Move a real arm a little over a scene that stands still, and compare expected with observed flow.\n"
         "Says in pixels how well the camera's pose on the arm is known, and where the table is.",
     )
-    hand_eye.add_argument(
-        "scenario", type=Path, nargs="?", metavar="SCENARIO", help="a YAML file (the built-in hardware.yaml)"
-    )
+    add_scenario(hand_eye, built_in=_HARDWARE)
     hand_eye.add_argument("--output", type=Path, metavar="DIR", help="folder for pictures (out/hand_eye)")
     add_overwrite(hand_eye, "check")
     hand_eye.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
@@ -286,13 +272,7 @@ def command_line() -> argparse.ArgumentParser:
         "Say what this machine and this installation can do, each with its remedy where it lacks something.\n"
         "Ends with 1 where something is missing that simulating and segmenting need.",
     )
-    doctor.add_argument(
-        "scenario",
-        type=Path,
-        nargs="?",
-        metavar="SCENARIO",
-        help="a YAML file, for its LCM network and channels (the built-in hardware.yaml)",
-    )
+    add_scenario(doctor, "a YAML file, for its LCM network and channels", _HARDWARE)
 
     diagram = _add(
         subparsers,

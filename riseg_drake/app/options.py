@@ -54,8 +54,14 @@ def add_overwrite(command: argparse.ArgumentParser, earlier: str) -> None:
     )
 
 
-def add_wait(command: argparse.ArgumentParser) -> None:
-    """Whether the browser's view stays."""
+def add_view(command: argparse.ArgumentParser) -> None:
+    """Whether it is shown in the browser, and whether that view stays."""
+    command.add_argument(
+        "--meshcat",
+        action=argparse.BooleanOptionalAction,
+        default=False,
+        help="show it in the browser and save the replay as DIR/replay.html (no)",
+    )
     command.add_argument(
         "--wait",
         action=argparse.BooleanOptionalAction,
@@ -64,12 +70,8 @@ def add_wait(command: argparse.ArgumentParser) -> None:
     )
 
 
-def add_scenario(command: argparse.ArgumentParser) -> None:
-    """The scenario, which may be left out."""
-    command.add_argument(
-        "scenario",
-        type=Path,
-        nargs="?",
-        metavar="SCENARIO",
-        help="a YAML file (the built-in simulation)",
-    )
+def add_scenario(
+    command: argparse.ArgumentParser, what: str = "a YAML file", built_in: str = "the built-in simulation"
+) -> None:
+    """The scenario, which may be left out: what is asked for, and what is taken then."""
+    command.add_argument("scenario", type=Path, nargs="?", metavar="SCENARIO", help=f"{what} ({built_in})")

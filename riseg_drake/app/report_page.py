@@ -15,6 +15,7 @@ from jinja2 import Environment, StrictUndefined
 from numpy.typing import NDArray
 
 from riseg_drake.app.package import package_version
+from riseg_drake.app.tables import objects_found, shares_in_percent
 from riseg_drake.evaluation.scores import Scores
 from riseg_drake.pictures.masks import draw_masks
 from riseg_drake.pictures.object_colors import object_colors
@@ -134,24 +135,7 @@ def scores_table(rows: Iterable[tuple[str, Scores]], first: str) -> Table:
     return Table(
         "Scores, in percent",
         head,
-        [
-            (
-                name,
-                *(
-                    f"{100 * share:.1f}"
-                    for share in (
-                        scores.overlap_precision,
-                        scores.overlap_recall,
-                        scores.overlap_f,
-                        scores.boundary_precision,
-                        scores.boundary_recall,
-                        scores.boundary_f,
-                    )
-                ),
-                f"{round(scores.objects_found, 1):g} of {round(scores.objects_true, 1):g}",
-            )
-            for name, scores in rows
-        ],
+        [(name, *shares_in_percent(scores), objects_found(scores)) for name, scores in rows],
     )
 
 

@@ -1,6 +1,7 @@
 """Figures as tables on the terminal."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import astuple
 
 from rich import box
 from rich.table import Table
@@ -22,21 +23,22 @@ def score_table(
     if in_motion:
         table.add_column("in motion\nF", justify="right", no_wrap=True)
     for name, scores in rows:
-        shares = (
-            scores.overlap_precision,
-            scores.overlap_recall,
-            scores.overlap_f,
-            scores.boundary_precision,
-            scores.boundary_recall,
-            scores.boundary_f,
-            scores.found_share,
-        )
         moved: tuple[str, ...] = ()
         if in_motion:
             moved = (f"{100 * in_motion[name]:.1f}" if name in in_motion else "",)
-        objects = f"{_count(scores.objects_found)} of {_count(scores.objects_true)}"
-        table.add_row(name, *(f"{100 * share:.1f}" for share in shares), objects, *moved)
+        found = f"{100 * scores.found_share:.1f}"
+        table.add_row(name, *shares_in_percent(scores), found, objects_found(scores), *moved)
     return table
+
+
+def shares_in_percent(scores: Scores) -> tuple[str, ...]:
+    """Precision, recall and F, of Overlap and then of Boundary."""
+    return tuple(f"{100 * share:.1f}" for share in astuple(scores)[:6])
+
+
+def objects_found(scores: Scores) -> str:
+    """How many of how many objects were found."""
+    return f"{_count(scores.objects_found)} of {_count(scores.objects_true)}"
 
 
 def _count(number: float) -> str:

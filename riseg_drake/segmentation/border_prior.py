@@ -44,8 +44,8 @@ def border_prior(keyframe: Keyframe, parameters: BorderPriorParameters) -> NDArr
     cues, cut = border_cues(keyframe), keyframe.superpixels
     weight = np.array([parameters.dent, parameters.valley, parameters.color, parameters.hole], np.float64)
     odds = np.clip(parameters.smooth + cues @ weight, parameters.least, parameters.most)
-    # Of what may go on behind something the still picture says nothing.
     odds = np.where(cut.across, parameters.least, odds)
+    # Of what may go on behind something the still picture says nothing.
     return np.where(cut.behind, 0.0, odds)
 
 

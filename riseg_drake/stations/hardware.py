@@ -11,8 +11,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.common.value import AbstractValue
-from pydrake.geometry import Meshcat, MeshcatVisualizer, SceneGraph
-from pydrake.multibody.plant import MultibodyPlant
+from pydrake.geometry import Meshcat, MeshcatVisualizerParams
 from pydrake.systems.framework import (
     BasicVector,
     Context,
@@ -20,18 +19,17 @@ from pydrake.systems.framework import (
     DiagramBuilder,
     EventStatus,
     LeafSystem,
-    OutputPort,
     State,
 )
-from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
 
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import Immutable
 from riseg_drake.robot.command_stream import CommandParameters
-from riseg_drake.robot.description import PandaDescription, add_panda
+from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.limits import check_start_position
 from riseg_drake.stations.arm_messages import AHEAD
+from riseg_drake.stations.arm_view import add_arm_view
 from riseg_drake.stations.lcm_channels import LcmConfig
 from riseg_drake.stations.lcm_images import ImageError, LcmImages, decode_images
 from riseg_drake.stations.lcm_reception import Reception
@@ -149,24 +147,10 @@ class HardwareStation(Diagram):
         for name, port in LcmView.PORTS.items():
             builder.ExportOutput(view.GetOutputPort(port), name)
         if meshcat is not None:
-            _add_arm_view(builder, config.panda, view.GetOutputPort("position"), meshcat)
+            angles = add_arm_view(builder, config.panda, meshcat, MeshcatVisualizerParams())
+            builder.Connect(view.GetOutputPort("position"), angles)
         builder.BuildInto(self)
         self.set_name("station")
-
-
-def _add_arm_view(
-    builder: DiagramBuilder, panda: PandaDescription, position: OutputPort, meshcat: Meshcat
-) -> None:
-    """Show the arm in the browser where it was measured to be."""
-    plant = MultibodyPlant(0.0)
-    scene_graph = builder.AddSystem(SceneGraph())
-    plant.RegisterAsSourceForSceneGraph(scene_graph)
-    add_panda(plant, panda)
-    plant.Finalize()
-    poses = builder.AddSystem(MultibodyPositionToGeometryPose(plant))
-    builder.Connect(position, poses.get_input_port())
-    builder.Connect(poses.get_output_port(), scene_graph.get_source_pose_port(plant.get_source_id()))
-    MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
 
 
 class Targets(LeafSystem):

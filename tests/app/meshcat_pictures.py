@@ -6,7 +6,7 @@ PAGE is a replay.html or the address of a run that is going on; a replay is show
 import argparse
 from pathlib import Path
 
-from tests.app.browser import MISSING, NARROW, WIDE, opened
+from tests.browser import MISSING, NARROW, WIDE, opened
 
 SETTLED = "viewer.scene_tree.find(['riseg', 'panel']).object.children.length > 0"
 SHARES = (0.5, 1.0)

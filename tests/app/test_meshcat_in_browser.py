@@ -10,7 +10,7 @@ from pydrake.geometry import Meshcat
 from riseg_drake.app.output import REPLAY, RunFolder
 from riseg_drake.app.run.command import run
 from riseg_drake.app.scenario import load_scenario
-from tests.app.browser import MISSING, opened
+from tests.browser import MISSING, opened
 
 pytestmark = [pytest.mark.renders, pytest.mark.skipif(bool(MISSING), reason=MISSING)]
 

@@ -1,7 +1,5 @@
 import base64
 import re
-import shutil
-import subprocess
 from html.parser import HTMLParser
 
 import cv2
@@ -10,8 +8,7 @@ import pytest
 
 from riseg_drake.app.report_page import Moment, Report, Table, found_objects, report_html, view
 from riseg_drake.pictures.masks import draw_masks
-
-CHROMIUM = shutil.which("chromium")
+from tests.browser import NO_PROGRAM, dumped
 
 
 def made(**other):
@@ -115,16 +112,12 @@ document.title = [...shown, (box.width / box.height).toFixed(2), fits].join(' ')
 </script></body>"""
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium here to open the page in; apt install chromium")
+@pytest.mark.skipif(bool(NO_PROGRAM), reason=NO_PROGRAM)
 @pytest.mark.renders
 @pytest.mark.parametrize("width", [1400, 400])
 def test_in_a_browser_the_slider_fades_the_masks_and_nothing_is_wrong(tmp_path, width):
     page, _ = made()
     (tmp_path / "page.html").write_text(page.replace("</body>", TRY))
-    options = ("--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--dump-dom")
-    page_url = (tmp_path / "page.html").as_uri()
-    opened = subprocess.run(
-        [CHROMIUM, *options, f"--window-size={width},900", page_url], capture_output=True, text=True, check=True
-    )
-    assert "<title>1 0.5 0 1.33 true</title>" in opened.stdout
-    assert "CONSOLE" not in opened.stderr
+    shown, said = dumped(tmp_path / "page.html", "--enable-logging=stderr", f"--window-size={width},900")
+    assert "<title>1 0.5 0 1.33 true</title>" in shown
+    assert "CONSOLE" not in said

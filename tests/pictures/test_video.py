@@ -1,5 +1,3 @@
-import shutil
-import subprocess
 from fractions import Fraction
 
 import av
@@ -7,9 +5,9 @@ import numpy as np
 import pytest
 
 from riseg_drake.pictures.video import VideoWriter, with_time
+from tests.browser import NO_PROGRAM, dumped
 
 RATE = 15.0
-CHROMIUM = shutil.which("chromium")
 
 
 def pictures(shape=(61, 83), count=9):
@@ -55,7 +53,7 @@ def test_its_pixels_are_those_that_were_shown_to_a_few_gray_levels(tmp_path):
             np.testing.assert_allclose(seen[15:25, u - 4 : u + 4].mean(axis=(0, 1)), (0, 158, 115), atol=6)
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium here to play the video in; apt install chromium")
+@pytest.mark.skipif(bool(NO_PROGRAM), reason=NO_PROGRAM)
 @pytest.mark.renders
 def test_a_browser_can_play_it_to_the_end(tmp_path):
     written(tmp_path / "video.mp4", (62, 84))
@@ -63,9 +61,7 @@ def test_a_browser_can_play_it_to_the_end(tmp_path):
         '<title>none</title><video muted preload="auto" src="video.mp4" oncanplaythrough="document.title = '
         "[this.readyState, this.videoWidth, this.videoHeight, this.duration.toFixed(3)].join(' ')\"></video>"
     )
-    options = ("--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=10000", "--dump-dom")
-    page = (tmp_path / "page.html").as_uri()
-    seen = subprocess.run([CHROMIUM, *options, page], capture_output=True, text=True, check=True).stdout
+    seen, _ = dumped(tmp_path / "page.html", "--virtual-time-budget=10000")
     assert "<title>4 84 62 0.600</title>" in seen  # 4: HAVE_ENOUGH_DATA; nine frames at 15 a second
 
 

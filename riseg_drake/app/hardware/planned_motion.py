@@ -3,15 +3,13 @@
 from collections.abc import Callable
 
 import numpy as np
-from pydrake.geometry import Meshcat, MeshcatVisualizer, MeshcatVisualizerParams, Rgba, SceneGraph
-from pydrake.multibody.plant import MultibodyPlant
+from pydrake.geometry import Meshcat, MeshcatVisualizerParams, Rgba
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.pushing.push import Push
-from riseg_drake.robot.description import add_panda
 from riseg_drake.robot.kinematics import PandaKinematics
+from riseg_drake.stations.arm_view import add_arm_view
 
 PATH = "/riseg/planned"
 GLASS = 0.35
@@ -34,17 +32,8 @@ class PlannedMotion:
         self._push: Push | None = None
         self._since = 0.0
         builder = DiagramBuilder()
-        plant = MultibodyPlant(0.0)
-        scene_graph = builder.AddSystem(SceneGraph())
-        plant.RegisterAsSourceForSceneGraph(scene_graph)
-        add_panda(plant, panda)
-        plant.Finalize()
-        poses = builder.AddSystem(MultibodyPositionToGeometryPose(plant))
-        builder.ExportInput(poses.get_input_port(), "position")
-        builder.Connect(poses.get_output_port(), scene_graph.get_source_pose_port(plant.get_source_id()))
-        MeshcatVisualizer.AddToBuilder(
-            builder, scene_graph, meshcat, MeshcatVisualizerParams(prefix=f"{PATH}/arm")
-        )
+        angles = add_arm_view(builder, panda, meshcat, MeshcatVisualizerParams(prefix=f"{PATH}/arm"))
+        builder.ExportInput(angles, "position")
         self._diagram = builder.Build()
         self._context = self._diagram.CreateDefaultContext()
 

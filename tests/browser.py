@@ -1,6 +1,7 @@
 """A headless Chromium with software graphics, for the pages that people look at."""
 
 import shutil
+import subprocess
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
@@ -13,14 +14,23 @@ _PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
 _GRAPHICS = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 PROGRAM = next(filter(None, map(shutil.which, _PROGRAMS)), None)
+NO_PROGRAM = "" if PROGRAM else "there is no Chromium: apt-get install chromium"
+"""Why no page can be opened; empty where it can."""
 MISSING = (
-    "there is no Chromium: apt-get install chromium"
+    NO_PROGRAM
     if PROGRAM is None
     else ""
     if find_spec("playwright")
     else "there is no playwright: pip install -e '.[browser]'"
 )
 """Why no page can be looked at; empty where it can."""
+
+
+def dumped(file, *options):
+    """What a page has become once its scripts have run, and all that the browser said; needs no playwright."""
+    given = ("--headless", "--no-sandbox", "--disable-gpu", *options, "--dump-dom")
+    done = subprocess.run([PROGRAM, *given, file.as_uri()], capture_output=True, text=True, check=True)
+    return done.stdout, done.stderr
 
 
 class Page:
