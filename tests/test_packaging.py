@@ -77,8 +77,10 @@ def test_an_installed_command_explains_itself(installed, tmp_path):
 
 
 def there_and_tracked(installed, cwd, prefix, patterns):
-    """The installed package's files that match patterns, and those that git has, by their paths in the checkout,
-    where the package is at `prefix`."""
+    """Files of the installed package that match patterns, and those that git has, as paths in the checkout.
+
+    There the package's folder is `prefix`.
+    """
     program = (
         "from importlib.resources import files\n"
         "from pathlib import Path\n"
