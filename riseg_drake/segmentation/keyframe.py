@@ -84,6 +84,11 @@ class Keyframe(Immutable):
         return self.superpixels.borders
 
     @property
+    def behind(self) -> NDArray[np.bool_]:
+        """[M], which of them lie behind something."""
+        return self.superpixels.behind
+
+    @property
     def across(self) -> NDArray[np.bool_]:
         """[M], which of them lie across a gap."""
         return self.superpixels.across

@@ -139,7 +139,7 @@ def _evidence(
     along = np.where(keyframe.over, parameters.carried, parameters.along)
     along[keyframe.across] = parameters.across
     # That what does not touch stands still says nothing.
-    stays = np.where(keyframe.across, 1.0, parameters.stays)
+    stays = np.where(keyframe.across | keyframe.behind, 1.0, parameters.stays)
     return bond_evidence(q, share, keyframe.borders, stays, along)
 
 

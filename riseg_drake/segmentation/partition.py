@@ -24,8 +24,9 @@ class PartitionParameters:
     rigid_min: float = 60.0
     """Nats that it must cost two parts to have one motion, before it counts against their being one body:
     fifteen superpixels' worth, as highlights and shadows make errors that are alike in many."""
-    most_apart: float = 2.0
-    """Nats a border that this is remembered as, at most: as much as the still picture says at most."""
+    most_apart: float = 4.0
+    """Nats a border that this is remembered as, at most: more than the still picture (2) and one push
+    along (1.6) say against it together."""
     moved_min: float = 8.0
     """Nats by which a motion must explain a body better than standing still does: two superpixels' worth."""
     margins: list[float] = field(default_factory=lambda: [0.5, 1.0, 1.5, 2.0, 3.0, 4.0])

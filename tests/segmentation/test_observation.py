@@ -49,10 +49,13 @@ def test_what_may_lie_on_its_neighbour_tells_less_by_going_with_it_and_as_much_b
 CERTAIN = ObservationParameters(outlier=0.0)
 
 
-def parts_beside_each_other(nats, *, across=False, over=False, given=CERTAIN):
+def parts_beside_each_other(nats, *, across=False, behind=False, over=False, given=CERTAIN):
     """Two parts, 0 and 1, of four superpixels in a row, with costs [G, 4]: what they say of each border."""
     keyframe = SimpleNamespace(
-        borders=np.array([[0, 1], [1, 2], [2, 3]]), across=np.full(3, across), over=np.full(3, over)
+        borders=np.array([[0, 1], [1, 2], [2, 3]]),
+        across=np.full(3, across),
+        behind=np.full(3, behind),
+        over=np.full(3, over),
     )
     seen = SimpleNamespace(nats=np.array(nats), share=SHARE)
     return evidence_of_parts(seen, keyframe, np.array([0, 0, 1, 1]), given)
@@ -66,9 +69,10 @@ def test_two_parts_that_surely_moved_as_one_are_so_by_what_else_would_have_moved
     assert evidence[1] == pytest.approx(np.log(1 / probability))
 
 
-def test_two_parts_that_stand_still_across_a_gap_say_nothing_of_each_other():
+@pytest.mark.parametrize("apart", ["across", "behind"])
+def test_two_parts_that_stand_still_without_touching_say_nothing_of_each_other(apart):
     still = np.array([[0.0] * 4, [40.0] * 4])
-    assert parts_beside_each_other(still, across=True) == pytest.approx(0.0)
+    assert parts_beside_each_other(still, **{apart: True}) == pytest.approx(0.0)
     assert parts_beside_each_other(still)[1] == pytest.approx(np.log(1 / 0.8))
 
 

@@ -3,6 +3,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from riseg_drake.segmentation.border_prior import BorderPriorParameters
+from riseg_drake.segmentation.observation import ObservationParameters
 from riseg_drake.segmentation.partition import (
     PartitionParameters,
     apart,
@@ -69,6 +71,12 @@ def test_that_two_parts_have_no_one_motion_is_remembered_at_all_borders_between_
     assert not apart(row, part, nats, PartitionParameters(rigid_min=64.0)).any()
     most = apart(row, part, nats, PartitionParameters(rigid_min=0.0, most_apart=2.0))
     np.testing.assert_allclose(most, [0, 0, -2.0, 0])
+
+
+def test_what_has_parted_outlives_the_best_of_pictures_and_one_push_along():
+    along = np.log(1 / ObservationParameters().along)
+    assert PartitionParameters().most_apart > BorderPriorParameters().most + along
+    assert PartitionParameters().most_apart < BorderPriorParameters().most + 2 * along
 
 
 def test_two_with_motions_of_their_own_are_two_though_the_border_says_one():
