@@ -125,7 +125,7 @@ def _visible_hulls(kinematics: Kinematics, margin: float) -> list[_Hull]:
             body = plant.get_body(body_index)
             frame = plant.GetBodyFrameIdOrThrow(body_index)
             for geometry in inspector.GetGeometries(frame, Role.kPerception):
-                corners, edges = _grown(_corners(inspector.GetShape(geometry)), margin)
+                corners, edges = _grown(hull_corners(inspector.GetShape(geometry)), margin)
                 X_BG = inspector.GetPoseInFrame(geometry)
                 hulls.append(_Hull(body, (X_BG @ corners.T).T, edges))
     return hulls
@@ -145,7 +145,7 @@ def _grown(points: NDArray, margin: float) -> tuple[NDArray[np.float64], NDArray
     return moved, np.unique(np.sort(edges, axis=1), axis=0)
 
 
-def _corners(shape: Shape) -> NDArray[np.float64]:
+def hull_corners(shape: Shape) -> NDArray[np.float64]:
     """Points [N, 3] whose convex hull is a shape's, round ones taken as slightly larger polyhedra."""
     if isinstance(shape, Mesh | Convex):
         try:

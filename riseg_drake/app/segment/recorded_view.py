@@ -36,6 +36,8 @@ class RecordedView:
     """The camera's pose at joint angles; None where it follows from none."""
     robot_mask: Callable[[NDArray], NDArray] | None = None
     """The robot's own pixels at joint angles; None where they follow from none."""
+    kinematics: Kinematics | None = None
+    """The robot that carries the camera; None where none is known."""
 
     def frame(self, recorded: RecordedFrame) -> Frame:
         """A recorded frame as the algorithm sees it, but for its number."""
@@ -94,6 +96,7 @@ def recorded_view(
         warnings=warnings,
         X_WC=kinematics.X_WC,
         robot_mask=robot_mask,
+        kinematics=kinematics,
     )
 
 
