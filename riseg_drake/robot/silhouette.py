@@ -146,7 +146,10 @@ def _grown(points: NDArray, margin: float) -> tuple[NDArray[np.float64], NDArray
 
 
 def hull_corners(shape: Shape) -> NDArray[np.float64]:
-    """Points [N, 3] whose convex hull is a shape's, round ones taken as slightly larger polyhedra."""
+    """Points [N, 3], m, whose convex hull is a shape's, round ones taken as slightly larger polyhedra.
+
+    Raises UnknownShapeError.
+    """
     if isinstance(shape, Mesh | Convex):
         try:
             hull = shape.GetConvexHull()

@@ -31,6 +31,8 @@ SAID = [
     "evaluate --suite clutter",
     "segment",
     "segment recording --output out --strict --export npz,poses",
+    "segment recording --rerun out.rrd",
+    "run --rerun",
     "convert recording folder",
     "score predicted true --json scores.json",
     "hardware",
