@@ -195,8 +195,6 @@ def test_a_damaged_size_is_not_asked_for(tmp_path, frames):
 
 
 @pytest.mark.parametrize(("name", "says"), [("metadata.yaml", "larger than 1 MB"), ("bag.db3", "not a file")])
-    ("name", "says"), [("metadata.yaml", "larger than 1 MB"), ("bag.db3", "is not a file")]
-)
 def test_what_the_library_would_wait_for_is_refused_before(tmp_path, frames, name, says):
     """3 GB of nothing in the place of a list of topics; a pipe that nobody writes to."""
     folder = write_bag(tmp_path / "bag", frames, SMALL, BagKind())
