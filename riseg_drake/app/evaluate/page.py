@@ -48,10 +48,8 @@ def evaluation_page(
             objects=None,
             doubts=[f"{r.name} (seed {r.seed}) failed: {r.failure}" for r in results if r.failure],
             tables=[
-                *(
-                    scores_table(rows, first)
-                    for rows, first in ((means, "method"), (steps, "after interaction"))
-                ),
+                scores_table(means, "method"),
+                scores_table(steps, "after interaction"),
                 scores_table(scenes, "scene, and how it ended"),
             ],
         )
