@@ -5,7 +5,15 @@ from pathlib import Path
 
 from riseg_drake.app import commands
 from riseg_drake.app.export_options import add_export
-from riseg_drake.app.options import add_overwrite, add_scenario, add_source, add_view, positive, seed_number
+from riseg_drake.app.options import (
+    add_overwrite,
+    add_rerun,
+    add_scenario,
+    add_source,
+    add_view,
+    positive,
+    seed_number,
+)
 from riseg_drake.app.package import package_version
 from riseg_drake.app.parser import Parser
 
@@ -36,6 +44,7 @@ def command_line() -> argparse.ArgumentParser:
     run.add_argument("--record", action="store_true", help="also write every frame to DIR/recording")
     add_view(run)
     add_export(run)
+    add_rerun(run)
 
     evaluate = _add(
         subparsers,
@@ -113,6 +122,7 @@ def command_line() -> argparse.ArgumentParser:
         help="hear a log that lcm-logplayer plays: old time stamps count as new, nothing is moved",
     )
     add_export(hardware)
+    add_rerun(hardware)
 
     hand_eye = _add(
         subparsers,
@@ -197,6 +207,7 @@ def command_line() -> argparse.ArgumentParser:
     )
     add_source(segment)
     add_export(segment)
+    add_rerun(segment)
     segment.add_argument(
         "--strict",
         action="store_true",

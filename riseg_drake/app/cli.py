@@ -88,6 +88,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.stations.misbehaviour import WordError
     from riseg_drake.stations.object_models import SceneError
     from riseg_drake.stations.physics import PhysicsError
+    from riseg_drake.timeline.file import TimelineError
 
     return (
         OSError,
@@ -112,4 +113,5 @@ def _mistakes() -> tuple[type[Exception], ...]:
         WordError,
         ModelError,
         ExportError,
+        TimelineError,
     )

@@ -33,6 +33,7 @@ from riseg_drake.robot.kinematics import PandaKinematics, observation_posture
 from riseg_drake.segmentation.segmentation import Segmentation
 from riseg_drake.stations.hardware import HardwareStation, TargetSink
 from riseg_drake.stations.lcm_reception import Reception
+from riseg_drake.stations.object_models import with_remedy
 from riseg_drake.stations.simulated import SimulatedStation, SimulatedStationConfig, start_position
 from riseg_drake.systems.arm_motion import ArmMotion, Permission
 from riseg_drake.systems.mask_refiner import NO_REFINED_MASK, MaskRefiner, RefinedMask
@@ -188,7 +189,7 @@ def make_diagram(
                 config.observe_pitch,
             )
     except (ValueError, RuntimeError) as error:
-        raise ScenarioError(" ".join(str(error).split())) from error
+        raise ScenarioError(with_remedy(str(error))) from error
 
     builder = DiagramBuilder()
     builder.AddSystem(station)

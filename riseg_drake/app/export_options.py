@@ -19,7 +19,7 @@ def add_export(command: argparse.ArgumentParser) -> None:
         type=_frame_numbers,
         default=(),
         metavar="NUMBERS",
-        help="frames that contact_graspnet gets, counted from 0, such as 0,30 (the last one)",
+        help="frames that npz gets, counted from 0, such as 0,30 (the last one)",
     )
 
 

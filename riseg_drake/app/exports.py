@@ -1,6 +1,6 @@
 """`--export`: what is segmented, in the formats of other tools, into the folder `export` of the output.
 
-export/coco/  export/bop/  export/contact_graspnet/  export/bundlesdf/  export/clouds/  export/motions/
+export/coco/  export/bop/  export/npz/  export/bundlesdf/  export/clouds/  export/poses/
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -15,9 +15,9 @@ from riseg_drake.export.bop import BopExport
 from riseg_drake.export.bundlesdf import BundleSdfExport
 from riseg_drake.export.clouds import CloudExport
 from riseg_drake.export.coco import CocoExport
-from riseg_drake.export.contact_graspnet import ContactGraspNetExport
 from riseg_drake.export.export_error import ExportError
-from riseg_drake.export.motions import write_motions
+from riseg_drake.export.npz import NpzExport
+from riseg_drake.export.poses import write_poses
 from riseg_drake.export.segmented_frame import SegmentedFrame
 from riseg_drake.host.processes import undisturbed
 from riseg_drake.recording import layout
@@ -41,13 +41,13 @@ class Exports:
     """
 
     def __init__(self, output: Path, formats: Sequence[str] = (), frames: Sequence[int] = ()):
-        if frames and "contact_graspnet" not in formats:
-            raise ExportError("--export-frames goes with --export contact_graspnet only")
+        if frames and "npz" not in formats:
+            raise ExportError("--export-frames goes with --export npz only")
         folder = output / EXPORT
         makers: dict[str, Callable[[Path], _FrameExport]] = {
             "coco": CocoExport,
             "bop": BopExport,
-            "contact_graspnet": lambda path: ContactGraspNetExport(path, frames),
+            "npz": lambda path: NpzExport(path, frames),
             "bundlesdf": BundleSdfExport,
         }
         self.formats = tuple(dict.fromkeys(formats))
@@ -55,7 +55,7 @@ class Exports:
         """What was left out and why, a line each; known at the end."""
         self._exports = [make(folder / name) for name, make in makers.items() if name in formats]
         self._clouds = CloudExport(folder / "clouds") if "clouds" in formats else None
-        self._motions = folder / "motions" if "motions" in formats else None
+        self._poses = folder / "poses" if "poses" in formats else None
         self._displacements = Displacements()
         self._number = 0
         self._known: tuple[int, ...] = ()
@@ -87,7 +87,7 @@ class Exports:
     def _write(self, frame: SegmentedFrame, segmentation: Segmentation) -> None:
         for export in self._exports:
             export.take(frame)
-        if self._clouds is not None or self._motions is not None:
+        if self._clouds is not None or self._poses is not None:
             self._displacements.take(segmentation)
             self._known = segmentation.object_ids
         if self._clouds is not None:
@@ -100,8 +100,8 @@ class Exports:
             self.notes += export.finish()
         if self._clouds is not None:
             self.notes += self._clouds.finish(self._known)
-        if self._motions is not None:
-            self.notes += write_motions(self._motions, self._displacements, self._known)
+        if self._poses is not None:
+            self.notes += write_poses(self._poses, self._displacements, self._known)
 
     def tell(self, console: Console) -> None:
         """Say where it is, and what is not."""

@@ -5,6 +5,9 @@ from pathlib import Path
 
 from riseg_drake.app.source_options import add_source_options
 
+IN_OUTPUT = Path()
+"""Stands for `--rerun` without a file: it goes to the output folder, and to a viewer that is opened."""
+
 
 def positive(text: str) -> int:
     """A whole number from 1 up."""
@@ -67,6 +70,19 @@ def add_view(command: argparse.ArgumentParser) -> None:
         action=argparse.BooleanOptionalAction,
         default=True,
         help="keep the browser's view until Enter once it is over (yes, at a terminal)",
+    )
+
+
+def add_rerun(command: argparse.ArgumentParser) -> None:
+    """Whether all is logged for Rerun's viewer, and where to."""
+    command.add_argument(
+        "--rerun",
+        type=Path,
+        nargs="?",
+        const=IN_OUTPUT,
+        metavar="FILE",
+        help="log all that is seen and found for Rerun's viewer, to FILE.rrd; without FILE to DIR/rerun.rrd, "
+        "and to a viewer that is opened where there is a screen (no)",
     )
 
 

@@ -19,8 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.app.exports import EXPORT
 from riseg_drake.app.output_folder import OutputFolder
 from riseg_drake.app.report_page import REPORT
+from riseg_drake.app.timelines import FILE
 from riseg_drake.evaluation.disturbance import Disturbance
 from riseg_drake.evaluation.in_motion import InMotion
 from riseg_drake.evaluation.scores import Scores
@@ -32,7 +34,7 @@ from riseg_drake.recording.writer import depth_to_millimetres
 
 RECORDING = "recording"
 REPLAY = "replay.html"
-PARTS = rf"\.?step_\d+(\.unfinished)?|{RECORDING}|export|{re.escape(REPLAY)}|{re.escape(REPORT)}"
+PARTS = "|".join([r"\.?step_\d+(\.unfinished)?", RECORDING, EXPORT, *map(re.escape, (FILE, REPLAY, REPORT))])
 """What a run puts into its folder, beside the summary."""
 
 

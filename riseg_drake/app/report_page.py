@@ -88,7 +88,8 @@ class Report:
     """How it ended, and why."""
     views: Sequence[View]
     moments: Sequence[Moment]
-    objects: Sequence[FoundObject]
+    objects: Sequence[FoundObject] | None
+    """None where the report is of many scenes, whose ids have nothing to do with each other."""
     doubts: Sequence[str]
     """What else is in doubt."""
     tables: Sequence[Table]

@@ -1,15 +1,22 @@
 """Two folders of label images with equal names, scored image by image."""
 
 import os
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.evaluation.scores import Scores, score
 from riseg_drake.host.images import DamagedImageError, read_image
+
+_MOST = 0.5
+"""Share of an image that no object fills."""
+_RIM, _WIDTH = 255, 15
+"""The value of rims that do not count in VOC and DAVIS, and pixels that these are less wide than."""
 
 
 class LabelFolderError(ValueError):
@@ -38,8 +45,42 @@ class LabelConventions:
         )
 
 
+class LabelHabits:
+    """Notices values of label images that can hardly be object ids."""
+
+    def __init__(self) -> None:
+        self._images = 0
+        self._around: Counter[tuple[str, int]] = Counter()
+        self._rims = 0
+
+    def look(self, prediction: NDArray, ground_truth: NDArray) -> None:
+        """Take note of one pair of images [H, W], after conventions were applied."""
+        self._images += 1
+        for side, labels in (("predicted", prediction), ("true", ground_truth)):
+            values, counts = np.unique(labels, return_counts=True)
+            if values[counts.argmax()] and counts.max() > _MOST * labels.size:
+                self._around[side, int(values[counts.argmax()])] += 1
+        rim = ground_truth == _RIM
+        self._rims += bool(rim.any()) and not cv2.erode(rim.astype(np.uint8), np.ones((_WIDTH, _WIDTH))).any()
+
+    def doubts(self) -> list[str]:
+        """A line for each habit that all images have, with the option that it asks for."""
+        options = {"predicted": "--predicted-background", "true": "--background"}
+        lines = [
+            f"{value} fills most of every {side} image; if it is the table, give {options[side]} {value}"
+            for (side, value), number in sorted(self._around.items())
+            if number == self._images
+        ]
+        if self._images and self._rims == self._images:
+            lines.append(f"{_RIM} is a rim in every true image; if it is to be ignored, give --ignore {_RIM}")
+        return lines
+
+
 def score_folders(
-    predicted: Path, true: Path, conventions: LabelConventions | None = None
+    predicted: Path,
+    true: Path,
+    conventions: LabelConventions | None = None,
+    habits: LabelHabits | None = None,
 ) -> Iterator[tuple[str, Scores]]:
     """Score every label PNG of one folder against the one of equal name in the other, in order of name.
 
@@ -61,7 +102,10 @@ def score_folders(
             raise LabelFolderError(
                 f"{name}: {_size(prediction)} pixels in {predicted}, but {_size(ground_truth)} in {true}"
             )
-        yield name, score(*conventions.apply(prediction, ground_truth))
+        pair = conventions.apply(prediction, ground_truth)
+        if habits is not None:
+            habits.look(*pair)
+        yield name, score(*pair)
 
 
 def read_labels(path: Path) -> NDArray[np.uint16]:

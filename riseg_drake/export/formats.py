@@ -1,3 +1,3 @@
 """What `--export` can be asked for."""
 
-FORMATS = ("coco", "bop", "contact_graspnet", "bundlesdf", "clouds", "motions")
+FORMATS = ("coco", "bop", "npz", "bundlesdf", "clouds", "poses")

@@ -103,6 +103,9 @@ class FramePair(Immutable):
         return np.linalg.inv(self.current.X_WC) @ self.reference.X_WC
 
 
+_NEAREST, _FARTHEST = 1e-4, 1e3
+"""m; of depth that is believed."""
+
 NO_PAIR = FramePair(NO_FRAME, NO_FRAME)
 """What there is before the first frame."""
 
@@ -114,6 +117,11 @@ def smooth_gray(color: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 
 def sanitize_depth(depth: NDArray) -> NDArray[np.float32]:
-    """Depth [H, W] in metres as float32 with every spelling of "invalid" (NaN, inf, < 0) turned into 0."""
-    depth = np.asarray(depth, np.float32)
-    return np.where((depth > 0) & (depth < np.inf), depth, np.float32(0))
+    """Depth [H, W] in metres as float32 with every spelling of "invalid" (NaN, inf, < 0) turned into 0.
+
+    So is what no camera measures, nearer than 0.1 mm or farther than 1 km: squares and inverses of it would not
+    be numbers.
+    """
+    with np.errstate(over="ignore"):
+        depth = np.asarray(depth).astype(np.float32)
+    return np.where((depth > _NEAREST) & (depth < _FARTHEST), depth, np.float32(0))

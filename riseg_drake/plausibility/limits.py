@@ -26,9 +26,9 @@ class PlausibilityLimits:
     """Share of the pairs of frames, two at least, that must contradict: poses that stop early do so in some."""
     shift: float = 3.5
     """Pixels by which depth may lie off colour: shadows beside steps are as wide in stereo cameras."""
-    shift_gain: float = 1.1
-    """How much better edges must agree at another shift than where they lie. On 23 right recordings it is
-    1.01 at most; at 8 pixels 1.2 to 1.8, but 1.01 to 1.12 on a real one whose depth is of low quality."""
+    shift_gain: float = 1.03
+    """How much better edges must agree at another shift than where they lie. On right recordings it is 1.01 at
+    most (docs/recordings.md); at 8 pixels 1.4 to 2.7, but 1.05 on a real one whose depth is of low quality."""
     jump: float = 0.06
     """Share of the image's width that things may move by between two frames: optical flow is worked out that
     far around them. Right recordings reach 0.04, jumps of 50 mm at half a metre 0.08."""

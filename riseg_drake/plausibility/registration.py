@@ -1,6 +1,7 @@
-"""Depth against colour: whether edges of the one lie where the other has them."""
+"""Depth against colour: whether edges of the one lie where the other has them, and run as they do."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -17,10 +18,31 @@ _AROUND = np.ones((11, 11), np.uint8)
 """How wide a shadow beside a step may be, in which a camera has no depth."""
 _FEWEST = 100
 """Pixels on edges of depth, over all frames, to say anything."""
+_STRONG = 0.95
+"""Quantile of the gradients of an image; what is stronger counts no more than that."""
+_SMOOTH_COLOR, _SMOOTH_DEPTH = 1.0, 2.0
+"""Pixels (standard deviation) over which the directions of edges are taken: those of depth are ragged."""
+
+
+@dataclass(frozen=True)
+class Shift:
+    """By how much depth lies beside colour."""
+
+    u: float
+    """Pixels to the right by which depth must be shifted, and"""
+    v: float
+    """down: the middle of all shifts at which edges agree by more than half of what they do at best."""
+    best: float
+    """Agreement at the best shift, 0..1, and"""
+    here: float
+    """the best one near none."""
 
 
 def edge_agreement(frames: Sequence[Frame]) -> NDArray[np.float64] | None:
-    """Mean gradient of colour, 0..1, at edges of depth that are shifted by up to REACH to all sides.
+    """Mean gradient of colour, 0..1, across edges of depth that are shifted by up to REACH to all sides.
+
+    A gradient g counts by its part across the edge, (g . n)^2 / |g|: half of |g| where directions have nothing
+    to do with each other. As cos^2 a = (1 + cos 2a) / 2, it is three correlations.
 
     [2 * rows + 1, 2 * columns + 1], no shift in the middle; None where depth has too few edges.
     """
@@ -28,15 +50,38 @@ def edge_agreement(frames: Sequence[Frame]) -> NDArray[np.float64] | None:
     total = np.zeros((2 * rows + 1, 2 * columns + 1))
     count = 0
     for frame in frames:
-        v, u = np.nonzero(_depth_edges(frame))
-        gradient = np.sqrt(frame.gradient_squared)
-        gradient = np.minimum(gradient / max(float(np.quantile(gradient, 0.95)), 1e-3), 1.0)
-        gradient[frame.robot] = 0
-        around = cv2.copyMakeBorder(gradient, rows, rows, columns, columns, cv2.BORDER_REFLECT_101)
-        for i, j in np.ndindex(total.shape):
-            total[i, j] += around[v + i, u + j].sum()
-        count += len(v)
+        edges = _depth_edges(frame)
+        count += np.count_nonzero(edges)
+        depth = np.where(frame.depth > 0, frame.depth, frame.depth.max())
+        across = _doubled_angle(*_gradient(depth.astype(np.float32), _SMOOTH_DEPTH))
+        gray = cv2.cvtColor(frame.color, cv2.COLOR_RGB2GRAY).astype(np.float32)
+        x, y = _gradient(gray, _SMOOTH_COLOR)
+        strength = np.hypot(x, y)
+        strength = np.minimum(strength / max(float(np.quantile(strength, _STRONG)), 1e-3), 1.0)
+        strength[frame.robot] = 0
+        for direction, normal in zip(_doubled_angle(x, y), across, strict=True):
+            around = cv2.copyMakeBorder(
+                strength * direction, rows, rows, columns, columns, cv2.BORDER_REFLECT_101
+            )
+            total += 0.5 * cv2.matchTemplate(around, np.where(edges, normal, 0), cv2.TM_CCORR)
     return total / count if count >= _FEWEST else None
+
+
+def best_shift(agreement: NDArray, near: float) -> Shift:
+    """Where edges agree best, and how well within `near` pixels of where they are.
+
+    `agreement` [2 * rows + 1, 2 * columns + 1] is that of `edge_agreement`.
+    """
+    rows, columns = REACH
+    dv, du = np.mgrid[-rows : rows + 1, -columns : columns + 1]
+    best = float(agreement.max())
+    # The edges of poor depth are smeared: agreement has a flat top then, whose middle tells more than its peak.
+    above = agreement - (best + float(np.median(agreement))) / 2
+    _, parts = cv2.connectedComponents((above > 0).astype(np.uint8))
+    weight = np.where(parts == parts.flat[int(np.argmax(agreement))], np.maximum(above, 0), 0)
+    weight /= max(float(weight.sum()), 1e-12)
+    here = float(agreement[np.hypot(dv, du) <= near].max())
+    return Shift(float((weight * du).sum()), float((weight * dv).sum()), best, here)
 
 
 def doubts_about_registration(frames: Sequence[Frame], pixels: float, limits: PlausibilityLimits) -> list[str]:
@@ -44,19 +89,26 @@ def doubts_about_registration(frames: Sequence[Frame], pixels: float, limits: Pl
     agreement = edge_agreement(frames)
     if agreement is None:
         return []
-    rows, columns = REACH
-    dv, du = np.mgrid[-rows : rows + 1, -columns : columns + 1]
-    beside = np.hypot(dv, du) > limits.shift
-    i, j = np.unravel_index(np.argmax(agreement), agreement.shape)
-    here, best = float(agreement[~beside].max()), float(agreement[i, j])
-    if best < limits.shift_gain * here:
+    shift = best_shift(agreement, limits.shift)
+    if np.hypot(shift.u, shift.v) <= limits.shift or shift.best < limits.shift_gain * shift.here:
         return []
-    u, v = pixels * float(du[i, j]), pixels * float(dv[i, j])
     return [
         "depth lies beside colour: its edges agree better with those of colour if it is shifted "
-        f"by ({u:+.0f}, {v:+.0f}) pixels (right, down), {best:.2f} against {here:.2f}; depth must "
-        "be aligned to colour"
+        f"by ({pixels * shift.u:+.0f}, {pixels * shift.v:+.0f}) pixels (right, down), {shift.best:.2f} against "
+        f"{shift.here:.2f}; depth must be aligned to colour"
     ]
+
+
+def _gradient(image: NDArray[np.float32], smooth: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """To the right and down, units a pixel."""
+    image = cv2.GaussianBlur(image, (0, 0), smooth)
+    return cv2.Sobel(image, cv2.CV_32F, 1, 0, scale=1 / 8), cv2.Sobel(image, cv2.CV_32F, 0, 1, scale=1 / 8)
+
+
+def _doubled_angle(x: NDArray[np.float32], y: NDArray[np.float32]) -> tuple[NDArray, NDArray, NDArray]:
+    """1, cos 2a and sin 2a of the directions of gradients: the same for both senses of one direction."""
+    squared = np.maximum(x * x + y * y, np.float32(1e-12))
+    return np.ones_like(x), (x * x - y * y) / squared, 2 * x * y / squared
 
 
 def _depth_edges(frame: Frame) -> NDArray[np.bool_]:

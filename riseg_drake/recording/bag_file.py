@@ -6,11 +6,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from riseg_drake.host.files import MOST_SETTINGS, FileError, is_file, read_text
 from riseg_drake.recording.layout import RecordingError
 
 EXTRA = "pip install 'riseg-drake[bags]'"
 SUFFIXES = (".bag", ".db3", ".mcap")
 """Of files with recorded messages."""
+METADATA = "metadata.yaml"
+"""In the folder of a bag of ROS 2."""
 _CUT = 4
 """Bytes that RealSense files have behind the messages of their images."""
 
@@ -66,15 +69,31 @@ def opened_bag(path: Path) -> Iterator[BagFile]:
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise RecordingError(f"{path} is a bag, which needs rosbags: {EXTRA}") from None
+    _check_files(path)
     try:
         # Bags of ROS 2 may not say what their messages are made of; the common ones are the same since Humble.
         with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
             yield BagFile(path, reader)
-    except (RecordingError, MemoryError):
+    except RecordingError:
         raise
+    except MemoryError:  # damaged sizes are asked for as they stand
+        raise RecordingError(f"{path} cannot be read: a part of it is larger than memory, or says so") from None
     except Exception as error:  # the library lets through whatever a damaged file makes of it
         what = str(error).split("\n")[0] or type(error).__name__
         raise RecordingError(f"{path} is no bag that can be read ({what})") from None
+
+
+def _check_files(path: Path) -> None:
+    """Raise RecordingError for what the library would wait for, or take in whole, whatever it is."""
+    if not path.is_dir():
+        return
+    try:
+        read_text(path / METADATA, MOST_SETTINGS)
+    except FileError as error:
+        raise RecordingError(str(error)) from None
+    for file in sorted(path.iterdir()):
+        if file.suffix in SUFFIXES and not is_file(file):
+            raise RecordingError(f"{file} is not a file; a bag's messages are in files")
 
 
 def bag_in(folder: Path) -> Path | None:
@@ -82,7 +101,7 @@ def bag_in(folder: Path) -> Path | None:
 
     Raises RecordingError where there are several.
     """
-    if (folder / "metadata.yaml").is_file():
+    if (folder / METADATA).is_file():
         return folder
     files = sorted(path for path in folder.iterdir() if path.suffix in SUFFIXES and path.is_file())
     if len(files) > 1:

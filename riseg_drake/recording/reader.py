@@ -86,7 +86,8 @@ class RecordingReader(RecordedSource):
     def _read_layout(self) -> None:
         """Camera, poses, joints and images as the project's own layout has them."""
         self._camera_file = self.folder / layout.CAMERA_FILE
-        self._registration, self.depth_scale = read_camera(self._camera_file, self._inside)
+        self._registration, self.depth_scale, odd = read_camera(self._camera_file, self._inside)
+        self.warnings += [f"{self._camera_file}: {line}" for line in odd]
         self.poses = self._table(layout.POSE_LIST, columns=8)
         if self.poses is not None:
             _check_rigid(self.poses)

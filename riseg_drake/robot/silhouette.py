@@ -16,6 +16,12 @@ from riseg_drake.geometry.camera import Intrinsics
 NEAR = 0.01
 """What is nearer to the camera's centre than this is not drawn, m."""
 _SUBPIXEL_BITS = 4
+_FLAT = 1e-6
+"""Share of a mesh's size, below which it has no volume."""
+_THIN = 5e-4
+"""m; half of how thick it is taken for then."""
+_LARGEST = 1e6
+"""m; corners farther away are none."""
 
 
 class UnknownShapeError(ValueError):
@@ -125,7 +131,7 @@ def _visible_hulls(kinematics: Kinematics, margin: float) -> list[_Hull]:
             body = plant.get_body(body_index)
             frame = plant.GetBodyFrameIdOrThrow(body_index)
             for geometry in inspector.GetGeometries(frame, Role.kPerception):
-                corners, edges = _grown(_corners(inspector.GetShape(geometry)), margin)
+                corners, edges = _grown(hull_corners(inspector.GetShape(geometry)), margin)
                 X_BG = inspector.GetPoseInFrame(geometry)
                 hulls.append(_Hull(body, (X_BG @ corners.T).T, edges))
     return hulls
@@ -145,8 +151,15 @@ def _grown(points: NDArray, margin: float) -> tuple[NDArray[np.float64], NDArray
     return moved, np.unique(np.sort(edges, axis=1), axis=0)
 
 
+def hull_corners(shape: Shape) -> NDArray[np.float64]:
+    """Points [N, 3], m, whose convex hull is a shape's, round ones taken as slightly larger polyhedra.
+
+    Something flat, as a sticker is, becomes a millimetre thick. Raises UnknownShapeError.
+    """
+    return _with_volume(_corners(shape))
+
+
 def _corners(shape: Shape) -> NDArray[np.float64]:
-    """Points [N, 3] whose convex hull is a shape's, round ones taken as slightly larger polyhedra."""
     if isinstance(shape, Mesh | Convex):
         try:
             hull = shape.GetConvexHull()
@@ -173,3 +186,14 @@ def _corners(shape: Shape) -> NDArray[np.float64]:
             + np.repeat(np.where(tilts < 0, -half, half), 24)[:, None] * up
         )
     raise UnknownShapeError(f"the robot's description has a visual {shape}; known are meshes and primitives")
+
+
+def _with_volume(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Corners [N, 3] as they are, or [8 N, 3] about them where they are flat."""
+    if not (np.abs(points) < _LARGEST).all():
+        raise UnknownShapeError("a mesh has corners that are nowhere")
+    extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False) if len(points) > 3 else np.zeros(3)
+    if extents[-1] > _FLAT * max(float(extents[0]), _FLAT):
+        return points
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+    return (points[:, None] + _THIN * signs).reshape(-1, 3)

@@ -22,6 +22,14 @@ from riseg_drake.stations.contact import touches_over_area
 from riseg_drake.stations.footprint import Footprint, footprint, shape_corners
 from riseg_drake.stations.roundness import axes_of_revolution
 
+SMALLEST, LARGEST = 0.003, 1.0
+"""m; of the longest side of an object."""
+HEAVIEST = 20.0
+"""kg; what a Panda can push at all is a tenth of it."""
+INERTIA_SHARE = 4.0
+"""Of the largest moment of inertia that a body of an object's mass and collision shape can have: the shape may
+be simpler than the body."""
+
 
 class SceneError(ValueError):
     """A scene that cannot be made; the message says in one line why, and what would be right."""
@@ -137,10 +145,19 @@ def measure(name: str, path: Path) -> ObjectModel:
         )
     except ValueError as error:
         raise SceneError(f"{path}: {error}") from error
+    _check_size(path, body, corners)
     over_areas = any(touches_over_area(inspector, geometry) for geometry in geometries)
     centre = body.default_com()
     axes = axes_of_revolution(corners - centre, np.vstack([np.eye(3), _principal_axes(body)]))
     return ObjectModel(name, path, X_WB, outline, corners, over_areas, centre, axes)
+
+
+def with_remedy(message: str) -> str:
+    """What to say of an error of Drake's about a model: in one line, with what helps where that is known."""
+    line = one_line(message)
+    if "no normals" in line:
+        line += "; its surface needs them: trimesh.load(FILE, process=False).export(FILE, include_normals=True)"
+    return line
 
 
 def resolve(path_or_url: str) -> Path:
@@ -163,6 +180,37 @@ def _resolve(folder_or_url: str) -> Path:
     if not os.path.isdir(folder):
         raise SceneError(f"objects: {folder} is not a folder; expected one with *.sdf or *.urdf models")
     return folder
+
+
+def _check_size(path: Path, body: RigidBody, corners: NDArray) -> None:
+    """Raise SceneError for what is no thing of a table, as a mesh in millimetres or a mass in grams is not."""
+    sides, mass = np.ptp(corners, axis=0), body.default_mass()
+    if not SMALLEST < sides.max() < LARGEST:
+        raise SceneError(
+            f"{path} is {sides.max():.3g} m long; things of a table are {SMALLEST:g} to {LARGEST:g} m; "
+            "a mesh in millimetres needs a scale of 0.001 0.001 0.001"
+        )
+    if mass > HEAVIEST:
+        raise SceneError(
+            f"{path} has mass {mass:g}; things of a table weigh up to {HEAVIEST:g} kg; is it in grams?"
+        )
+    # The farthest that mass can be from the axis through the middle is half the longest diagonal.
+    most = mass * float(np.linalg.norm(sides) / 2) ** 2
+    moments = body.default_spatial_inertia().Shift(body.default_com()).CalcRotationalInertia()
+    largest = float(np.linalg.eigvalsh(moments.CopyToFullMatrix3()).max())
+    if largest > INERTIA_SHARE * most and _says_inertia(path):
+        raise SceneError(
+            f"{path} has a moment of inertia of {largest:.3g} kg m^2; "
+            f"of its mass and size it is {most:.2g} at most"
+        )
+
+
+def _says_inertia(path: Path) -> bool:
+    """Whether a file holds any: of what it does not say, SDF makes 1 kg m^2."""
+    try:
+        return next(ElementTree.parse(path).iter("inertia"), None) is not None
+    except ElementTree.ParseError:
+        return False
 
 
 def _masses_said(path: Path) -> list[float]:

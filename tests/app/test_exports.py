@@ -70,13 +70,13 @@ def test_every_format_has_the_masks_that_the_command_wrote(exported):
             ):
                 np.testing.assert_array_equal(mine, mask == a)
     last = len(there) - 1
-    with np.load(export / f"contact_graspnet/{last:06d}.npz") as data:
+    with np.load(export / f"npz/{last:06d}.npz") as data:
         np.testing.assert_array_equal(data["segmap"], there[last])
     assert coco.dataset["images"][3]["file_name"] == "rgb/000003.png"
 
 
 def test_the_motion_of_a_pushed_box_is_the_one_that_it_was_drawn_with_over_both_pushes(exported):
-    file = exported / "export/motions/object_1.txt"
+    file = exported / "export/poses/object_1.txt"
     p_WB = [float(x) for x in file.read_text().splitlines()[1].split(": ")[1].split(";")[0].split()]
     lines = np.loadtxt(file)
     assert lines[0, 0] <= 3 / 15 + 1e-9  # from the keyframe before the push on
@@ -104,12 +104,12 @@ def test_the_cloud_of_a_pushed_box_lies_on_its_top_where_it_was_drawn_last(expor
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--export", "cocoa"], "'cocoa' is no format; the formats are coco, bop, contact_graspnet"),
+        (["--export", "cocoa"], "'cocoa' is no format; the formats are coco, bop, npz"),
         (["--export", ","], "no format is named; the formats are coco"),
-        (["--export", "contact_graspnet", "--export-frames", "1,x"], "'1,x' is no list of frame numbers"),
+        (["--export", "npz", "--export-frames", "1,x"], "'1,x' is no list of frame numbers"),
         (
             ["--export", "bop", "--export-frames", "1"],
-            "--export-frames goes with --export contact_graspnet only",
+            "--export-frames goes with --export npz only",
         ),
     ],
 )

@@ -29,6 +29,8 @@ def test_the_table_of_a_command_has_its_options_and_their_words(command):
         if action.option_strings and action.nargs is None:
             word = action.metavar or ("MODE" if len(action.choices) > 1 else action.choices[0])
             words = [f"{words[0]} {word}"]
+        elif action.nargs == "?" and action.option_strings:
+            words = [f"{words[0]} [{action.metavar}]"]
         real.append(" ".join(words))
     assert sorted(written) == sorted(real)
 

@@ -6,6 +6,7 @@ from PIL import Image
 from riseg_drake.evaluation.label_folders import (
     LabelConventions,
     LabelFolderError,
+    LabelHabits,
     read_labels,
     score_folders,
 )
@@ -161,3 +162,43 @@ def test_another_value_may_be_background_in_one_folder_alone(folders):
     assert (
         dict(score_folders(true, predicted, LabelConventions(predicted_background=1)))["a.png"].overlap_f == 1
     )
+
+
+def blobs():
+    labels = np.zeros((120, 160), np.uint8)
+    labels[20:60, 20:60], labels[30:80, 90:130] = 1, 2
+    return labels
+
+
+def habits_of(prediction, truth, **conventions):
+    habits = LabelHabits()
+    for _ in range(2):
+        habits.look(*LabelConventions(**conventions).apply(prediction, truth))
+    return habits.doubts()
+
+
+def test_a_table_that_counts_as_an_object_is_told_with_the_option():
+    table = np.where(blobs() > 0, blobs() + 1, 1).astype(np.uint8)
+    assert habits_of(blobs(), blobs()) == []
+    assert habits_of(table, blobs()) == [
+        "1 fills most of every predicted image; if it is the table, give --predicted-background 1"
+    ]
+    (line,) = habits_of(blobs(), table)
+    assert line == "1 fills most of every true image; if it is the table, give --background 1"
+    assert habits_of(blobs(), table, background=1) == []
+
+
+def test_a_rim_of_255_is_told_with_the_option_and_an_object_of_that_id_is_not():
+    near = cv2.dilate(blobs(), np.ones((5, 5)))
+    rims = np.where((near > 0) & (blobs() == 0), 255, blobs()).astype(np.uint8)
+    (line,) = habits_of(blobs(), rims)
+    assert line == "255 is a rim in every true image; if it is to be ignored, give --ignore 255"
+    assert habits_of(blobs(), rims, ignore=255) == []
+    assert habits_of(blobs(), np.where(blobs() == 2, 255, blobs()).astype(np.uint8)) == []
+
+
+def test_one_image_that_an_object_fills_is_no_habit():
+    habits = LabelHabits()
+    habits.look(blobs(), blobs())
+    habits.look(np.ones((120, 160), np.uint8), np.ones((120, 160), np.uint8))
+    assert habits.doubts() == []

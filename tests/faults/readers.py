@@ -1,19 +1,15 @@
 """Everything that reads what somebody else made: a right input, what is done to it, and how it is read."""
 
-import contextlib
-import io
 import json
-import os
 import random
 import shutil
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from riseg_drake.app.cli import _mistakes, main
+from riseg_drake.app.cli import main
 from riseg_drake.app.evaluate.command import scene_tasks
 from riseg_drake.app.evaluate.scene_folder import is_finished, read_result
 from riseg_drake.app.output_folder import OutputFolder
@@ -26,7 +22,9 @@ from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.recording.reader import RecordingReader
 from riseg_drake.stations.lcm_images import decode_images, decode_message, encode_images
 from riseg_drake.stations.object_models import find_models
-from tests.faults.mutations import chunked_png, misplaced, mutated, resized_jpeg, resized_png
+from tests.faults.mutations import mutated, resized_jpeg, resized_png
+from tests.faults.reader import Reader, all_files, as_command, some
+from tests.faults.sources import SOURCES, SOURCES_NEED, state_of
 from tests.recording.made_recordings import drawn_frames, write
 
 CAMERA = Intrinsics(64, 48, 61.6, 61.6, 31.2, 23.4)
@@ -52,65 +50,6 @@ GANTRY = """<robot name="gantry"><link name="base"/><link name="hand"><visual><o
 <origin xyz="0 0 0.45" rpy="3.14159265 0 0"/></joint></robot>"""
 
 
-@dataclass(frozen=True)
-class Reader:
-    """A way in."""
-
-    prepare: Callable[[Path], None]
-    """Write a right input into an empty folder."""
-    mutate: Callable[[Path, random.Random], str]
-    """Do something to it; says what."""
-    read: Callable[[Path], int]
-    """Exit code, as the command line has it; one line is on the error stream where it is 2."""
-
-
-def _as_command(read: Callable[[Path], object]) -> Callable[[Path], int]:
-    """Read as the command line does: what it would say in one line is said."""
-
-    def reading(place: Path) -> int:
-        try:
-            read(place)
-        except _mistakes() as error:
-            with contextlib.redirect_stderr(io.StringIO()):
-                return 2 if str(error) else 1
-        return 0
-
-    return reading
-
-
-def _change(path: Path, rng: random.Random) -> str:
-    """Something is done to one file."""
-    if os.path.lexists(path) and (path.is_symlink() or not path.is_file() or path.stat().st_size > 2**24):
-        return f"{path.name} left as it is"  # it was misplaced before
-    if rng.random() < 0.06:
-        misplaced(path, rng)
-        return f"{path.name} misplaced"
-    content = path.read_bytes() if path.exists() else b""
-    special = [mutated]
-    if content[:4] == b"\x89PNG":
-        special += [resized_png, chunked_png]
-    elif content[:2] == b"\xff\xd8":
-        special.append(resized_jpeg)
-    how = rng.choice(special)
-    path.unlink(missing_ok=True)
-    path.write_bytes(how(content, rng))
-    return f"{path.name} {how.__name__}"
-
-
-def _some(files: Callable[[Path], list[Path]]) -> Callable[[Path, random.Random], str]:
-    """One to three of some files are changed."""
-
-    def mutate(place: Path, rng: random.Random) -> str:
-        there = sorted(files(place))
-        return ", ".join(_change(rng.choice(there), rng) for _ in range(rng.choice((1, 1, 1, 2, 3))))
-
-    return mutate
-
-
-def _all_files(place: Path) -> list[Path]:
-    return [path for path in place.rglob("*") if not path.is_dir()]
-
-
 def _recording(place: Path) -> None:
     folder = write(place / "recording", drawn_frames(4, CAMERA), CAMERA)
     (folder / "run.json").write_text('{"seed": 3}\n')
@@ -133,19 +72,15 @@ def _recording_files(place: Path) -> list[Path]:
 
 def _segment(place: Path) -> int:
     output = place / "out"
-    before = _state_of(place / "recording")
+    before = state_of(place / "recording")
     code = main(["segment", str(place / "recording"), "--output", str(output)])
-    assert _state_of(place / "recording") == before, "the recording was changed"
+    assert state_of(place / "recording") == before, "the recording was changed"
     assert {path.name for path in place.iterdir()} <= {"recording", "elsewhere", "out"}, "stray files"
     if code == 0:
         assert json.loads((output / "summary.json").read_text())["state"] == "done"
         for mask in (output / "mask").glob("*"):
             assert cv2.imread(str(mask), cv2.IMREAD_UNCHANGED).dtype == np.uint16
     return code
-
-
-def _state_of(folder: Path) -> dict[str, int]:
-    return {str(path): path.lstat().st_mtime_ns for path in folder.rglob("*")}
 
 
 def _models(place: Path) -> None:
@@ -283,22 +218,21 @@ def _read_results(place: Path) -> None:
     OutputFolder(place / "run", "run", r"step_\d+", {}, overwrite=True).close()
 
 
-NEEDS = {"checkpoints": "torch", "SAM folders": "transformers"}
+NEEDS = {"checkpoints": "torch", "SAM folders": "transformers", **SOURCES_NEED}
 """What may not be installed; those readers are left out then."""
 READERS = {
-    "recordings": Reader(_recording, _some(_recording_files), _segment),
-    "scenarios": Reader(_scenarios, _some(_all_files), _as_command(_load_scenarios)),
-    "models": Reader(_models, _some(_all_files), _as_command(lambda p: find_models(str(p / "models")))),
-    "robots": Reader(_robot, _some(lambda p: [p / "gantry.urdf"]), _as_command(_view)),
-    "masks": Reader(
-        _masks, _some(_all_files), lambda p: main(["score", str(p / "predicted"), str(p / "true")])
-    ),
-    "pictures over LCM": Reader(_pictures, _change_picture, _as_command(_decode)),
-    "checkpoints": Reader(_checkpoint, _some(_all_files), _as_command(_load_checkpoints)),
-    "SAM folders": Reader(_sam, _some(_all_files), _as_command(_load_sam)),
-    "earlier results": Reader(_results, _some(_all_files), _as_command(_read_results)),
+    "recordings": Reader(_recording, some(_recording_files), _segment),
+    "scenarios": Reader(_scenarios, some(all_files), as_command(_load_scenarios)),
+    "models": Reader(_models, some(all_files), as_command(lambda p: find_models(str(p / "models")))),
+    "robots": Reader(_robot, some(lambda p: [p / "gantry.urdf"]), as_command(_view)),
+    "masks": Reader(_masks, some(all_files), lambda p: main(["score", str(p / "predicted"), str(p / "true")])),
+    "pictures over LCM": Reader(_pictures, _change_picture, as_command(_decode)),
+    "checkpoints": Reader(_checkpoint, some(all_files), as_command(_load_checkpoints)),
+    "SAM folders": Reader(_sam, some(all_files), as_command(_load_sam)),
+    "earlier results": Reader(_results, some(all_files), as_command(_read_results)),
+    **SOURCES,
 }
-"""By what they read. Formats to come, bags among them, are further lines."""
+"""By what they read."""
 SHARES = {"recordings": 4, "scenarios": 3, "models": 3, "robots": 2, "masks": 3, "pictures over LCM": 4}
 """Of all inputs, how many parts each reader gets; one if it is not here."""
 

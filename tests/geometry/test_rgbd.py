@@ -60,10 +60,10 @@ def test_the_motion_of_a_pair_takes_points_of_the_first_camera_to_the_second():
 
 
 def test_every_spelling_of_no_depth_is_0_and_depth_is_kept():
-    spelt = np.array([np.nan, np.inf, -np.inf, -0.1, 0.0, 1e-6, 0.5, 20.0])
+    spelt = np.array([np.nan, np.inf, -np.inf, -0.1, 0.0, 1e-38, 1e-6, 0.001, 0.5, 20.0, 1e19, 1e300])
     cleaned = sanitize_depth(spelt)
     assert cleaned.dtype == np.float32
-    np.testing.assert_array_equal(cleaned, np.float32([0, 0, 0, 0, 0, 1e-6, 0.5, 20]))
+    np.testing.assert_array_equal(cleaned, np.float32([0, 0, 0, 0, 0, 0, 0, 0.001, 0.5, 20, 0, 0]))
 
 
 def test_a_copy_of_what_nobody_changes_is_itself():

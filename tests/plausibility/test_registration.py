@@ -1,10 +1,18 @@
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
+from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.plausibility.limits import PlausibilityLimits
-from riseg_drake.plausibility.registration import REACH, doubts_about_registration, edge_agreement
+from riseg_drake.plausibility.registration import (
+    REACH,
+    best_shift,
+    doubts_about_registration,
+    edge_agreement,
+)
 from tests.segmentation.drawn_scene import Blank, DrawnScene, looking_down, planar
 
 LIMITS = PlausibilityLimits()
@@ -32,14 +40,51 @@ def test_edges_agree_best_where_they_are(frames):
     assert doubts_about_registration(frames, 1.0, LIMITS) == []
 
 
-@pytest.mark.parametrize(("v", "u"), [(0, 8), (0, -12), (5, 6), (0, 16)])
+@pytest.mark.parametrize(("v", "u"), [(0, 8), (0, -12), (4, 6), (0, 16)])
 def test_depth_that_lies_beside_colour_is_told_by_how_much(frames, v, u):
-    agreement = edge_agreement(shifted(frames, v, u))
-    i, j = np.unravel_index(np.argmax(agreement), agreement.shape)
-    assert abs(i - REACH[0] + v) <= 1
-    assert abs(j - REACH[1] + u) <= 1
-    (line,) = doubts_about_registration(shifted(frames, v, u), 2.0, LIMITS)
-    assert f"shifted by ({2 * (j - REACH[1]):+.0f}, {2 * (i - REACH[0]):+.0f}) pixels" in line
+    beside = shifted(frames, v, u)
+    shift = best_shift(edge_agreement(beside), LIMITS.shift)
+    assert abs(shift.u + u) <= 1
+    assert abs(shift.v + v) <= 1
+    (line,) = doubts_about_registration(beside, 2.0, LIMITS)
+    assert f"shifted by ({2 * shift.u:+.0f}, {2 * shift.v:+.0f}) pixels" in line
+
+
+def smeared(frames):
+    """Depth of low quality: its steps wander by 4 pixels to both sides, differently in each row."""
+    rng = np.random.default_rng(1)
+    wander = cv2.GaussianBlur(rng.normal(0, 1, (240, 1)), (1, 0), 0, sigmaY=3.0)
+    by = np.round(4 * wander / np.abs(wander).max()).astype(int).ravel()
+    return [
+        replace(f, depth=np.stack([np.roll(row, n) for row, n in zip(f.depth, by, strict=True)]))
+        for f in frames
+    ]
+
+
+def test_depth_of_low_quality_is_told_by_the_middle_of_where_it_agrees(frames):
+    """Its agreement is flat about the best shift, and hardly better there than 4 pixels beside."""
+    poor = smeared(frames)
+    assert doubts_about_registration(poor, 1.0, LIMITS) == []
+    shift = best_shift(edge_agreement(shifted(poor, 0, 8)), LIMITS.shift)
+    assert shift.u == pytest.approx(-8, abs=1.5)
+    assert len(doubts_about_registration(shifted(poor, 0, 8), 1.0, LIMITS)) == 1
+
+
+def test_an_edge_that_runs_another_way_counts_half():
+    """A vertical step of depth over stripes of colour: 1 where they are vertical, 0 where horizontal."""
+    depth = np.full((120, 160), 0.5, np.float32)
+    depth[:, :80] = 0.4
+    stripes = np.full((120, 160, 3), 60, np.uint8)
+    stripes[:, 80:] = 200
+    levels = np.full((120, 160, 3), 60, np.uint8)
+    levels[60:] = 200
+    agreement = {}
+    for name, color in (("along", stripes), ("across", levels)):
+        k = Intrinsics(160, 120, 150.0, 150.0, 79.5, 59.5)
+        frame = Frame(0, 0.0, k, color, depth, np.eye(4), np.zeros((120, 160), bool))
+        agreement[name] = edge_agreement([frame]).max()
+    assert agreement["along"] > 0.9
+    assert agreement["across"] < 0.02
 
 
 def test_shadows_beside_steps_are_no_shift(frames):

@@ -1,5 +1,6 @@
 """Bags against the folder of the same frames, and what a bag may lack or have too much of."""
 
+import os
 from contextlib import suppress
 from dataclasses import replace
 
@@ -181,3 +182,27 @@ def test_images_without_a_partner_in_time_are_left_out(tmp_path, frames):
         "/camera/color/image_raw: image 2 is left out: /camera/aligned_depth_to_color/image_raw has nothing "
         "within 0.02 s of it"
     )
+
+
+def test_a_damaged_size_is_not_asked_for(tmp_path, frames):
+    """The first record of an mcap file, behind 8 bytes of magic and its kind, says how long it is."""
+    file = write_bag(tmp_path / "bag", frames, SMALL, BagKind(storage="mcap", bare=True))
+    content = bytearray(file.read_bytes())
+    content[9:17] = (2**62).to_bytes(8, "little")
+    file.write_bytes(content)
+    with pytest.raises(RecordingError, match="cannot be read"):
+        opened_source(file, SourceOptions())
+
+
+@pytest.mark.parametrize(("name", "says"), [("metadata.yaml", "larger than 1 MB"), ("bag.db3", "not a file")])
+def test_what_the_library_would_wait_for_is_refused_before(tmp_path, frames, name, says):
+    """3 GB of nothing in the place of a list of topics; a pipe that nobody writes to."""
+    folder = write_bag(tmp_path / "bag", frames, SMALL, BagKind())
+    (folder / name).unlink()
+    if name == "bag.db3":
+        os.mkfifo(folder / name)
+    else:
+        with (folder / name).open("wb") as file:
+            file.truncate(3 * 2**30)
+    with pytest.raises(RecordingError, match=says):
+        opened_source(folder, SourceOptions())

@@ -1,21 +1,24 @@
 import numpy as np
 import pytest
 from pydrake.geometry import (
+    Box,
     ClippingRange,
     DepthRange,
     DepthRenderCamera,
     MakeRenderEngineVtk,
+    Mesh,
     RenderCameraCore,
     RenderEngineVtkParams,
 )
 from pydrake.math import RigidTransform
 from pydrake.planning import RobotDiagramBuilder
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
+from scipy.spatial import ConvexHull
 
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.robot.description import PandaDescription, add_panda
 from riseg_drake.robot.kinematics import observe_pose, tip_pointing_down
-from riseg_drake.robot.silhouette import NEAR, RobotSilhouette
+from riseg_drake.robot.silhouette import NEAR, RobotSilhouette, UnknownShapeError, hull_corners
 
 D415 = Intrinsics(640, 480, 616.285, 615.778, 301.418, 232.864)
 
@@ -102,3 +105,18 @@ def test_a_margin_grows_the_silhouette_on_every_side(panda):
     assert rows.min() - more_rows.min() == pytest.approx(5, abs=1)
     assert columns.min() - more_columns.min() == pytest.approx(5, abs=1)
     assert more_columns.max() - columns.max() == pytest.approx(5, abs=1)
+
+
+def test_a_flat_mesh_is_a_millimetre_thick(tmp_path):
+    """Three corners in a plane have no convex hull with a volume."""
+    sticker = tmp_path / "sticker.obj"
+    sticker.write_text("v 0 0 0.2\nv 0.1 0 0.2\nv 0.1 0.1 0.2\nv 0 0.1 0.2\nf 1 2 3\nf 1 3 4\n")
+    for corners in (hull_corners(Mesh(str(sticker), 1.0)), hull_corners(Box(0.1, 0.1, 1e-12))):
+        assert ConvexHull(corners).volume == pytest.approx(0.101 * 0.101 * 0.001, rel=1e-3)
+
+
+def test_a_mesh_with_a_corner_that_is_nowhere_cannot_be_drawn(tmp_path):
+    spike = tmp_path / "spike.obj"
+    spike.write_text("v 0 0 0\nv 1e30 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n")
+    with pytest.raises(UnknownShapeError, match="mesh"):
+        hull_corners(Mesh(str(spike), 1.0))

@@ -12,10 +12,12 @@ from pydrake.common.yaml import yaml_dump_typed
 from rich.console import Console
 
 from riseg_drake.app.evaluate.given_masks import parse_given_masks, with_given_masks
+from riseg_drake.app.evaluate.page import evaluation_page
 from riseg_drake.app.evaluate.progress import EvaluationProgress
 from riseg_drake.app.evaluate.scene_folder import SceneTask, digest, is_finished, read_result
 from riseg_drake.app.evaluate.scene_pool import Pool, pool_for
 from riseg_drake.app.output_folder import OutputFolder
+from riseg_drake.app.report_page import REPORT as PAGE
 from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
 from riseg_drake.app.tables import score_table
 from riseg_drake.evaluation.disturbance import disturbance_of_all, disturbance_of_steps
@@ -29,7 +31,7 @@ from riseg_drake.recording.whole_file import write_bytes, write_text
 from riseg_drake.stations.object_models import find_models
 
 REPORT = "report.md"
-PARTS = rf"scene_\d+|{re.escape(REPORT)}|{re.escape(FIGURE_FILE)}"
+PARTS = "|".join([r"scene_\d+", *map(re.escape, (REPORT, PAGE, FIGURE_FILE))])
 """What an evaluation puts into its folder, beside the summary."""
 
 
@@ -147,6 +149,7 @@ def _evaluate(
     with folder.writing():
         write_text(folder.path / REPORT, report_text(results, about, last_step))
         write_bytes(folder.path / FIGURE_FILE, figure_png(results, last_step))
+        write_text(folder.path / PAGE, evaluation_page(results, tasks, folder.summary, last_step))
     folder.note(state="done", **_figures(results, last_step))
     return results
 

@@ -6,7 +6,7 @@ from rich.console import Console
 
 from riseg_drake.app.output_folder import to_json, write_told
 from riseg_drake.app.tables import score_table
-from riseg_drake.evaluation.label_folders import LabelConventions, score_folders
+from riseg_drake.evaluation.label_folders import LabelConventions, LabelHabits, score_folders
 from riseg_drake.evaluation.scores import mean_scores
 
 MOST_ROWS = 20
@@ -24,7 +24,8 @@ def score_command(
 
     Raises LabelFolderError for folders that cannot be compared, OutputError where the file cannot be written.
     """
-    images = dict(score_folders(predicted, true, conventions))
+    habits = LabelHabits()
+    images = dict(score_folders(predicted, true, conventions, habits))
     mean = mean_scores(list(images.values()))
     if json_file is not None:
         content = {
@@ -33,5 +34,7 @@ def score_command(
         }
         write_told(json_file, to_json(content).encode())
     rows = [*images.items(), ("mean", mean)] if len(images) <= MOST_ROWS else [("mean", mean)]
+    for line in habits.doubts():
+        console.print(line, style="yellow", highlight=False, soft_wrap=True)
     console.print(f"{len(images)} image{'s' if len(images) > 1 else ''}, figures in percent")
     console.print(score_table(rows, first="\nimage"))

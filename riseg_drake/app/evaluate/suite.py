@@ -19,11 +19,13 @@ from typing import Any
 from rich.console import Console
 
 from riseg_drake.app.evaluate.command import REPORT, EvaluationError, interruption_told, scene_tasks
+from riseg_drake.app.evaluate.page import evaluation_page
 from riseg_drake.app.evaluate.progress import EvaluationProgress
 from riseg_drake.app.evaluate.scene_folder import SceneTask, digest, is_finished, read_result
 from riseg_drake.app.evaluate.scene_pool import Pool, pool_for
 from riseg_drake.app.evaluate.scene_work import SceneOutcome
 from riseg_drake.app.output_folder import OutputFolder
+from riseg_drake.app.report_page import REPORT as PAGE
 from riseg_drake.app.scenario import Scenario, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.tables import score_table
@@ -155,6 +157,7 @@ def _of_kind(
     folder = tasks[0].folder.parent
     write_text(folder / REPORT, report_text(scenes, about, last_step))
     write_bytes(folder / FIGURE_FILE, figure_png(scenes, last_step))
+    write_text(folder / PAGE, evaluation_page(scenes, tasks, {}, last_step))
     return KindResult(kind.name, kind.folder, scenes, last_step)
 
 

@@ -23,11 +23,12 @@ from riseg_drake.app.hardware.terminal_operator import TerminalOperator
 from riseg_drake.app.meshcat_replay import replay, stay
 from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step
 from riseg_drake.app.planned_speed import check_limits, planned_limits
-from riseg_drake.app.run.command import Narrator, export_listener, report, state_of
+from riseg_drake.app.run.command import Narrator, export_listener, report, state_of, timeline_listener
 from riseg_drake.app.run.interactions import Listener, Progress, TruthSource, WallClock, interactions
 from riseg_drake.app.run.recording import recording_of
 from riseg_drake.app.scenario import HARDWARE, Scenario, load_scenario, scenario_name
 from riseg_drake.app.scenario_file import ScenarioError
+from riseg_drake.app.timelines import Timeline, percent
 from riseg_drake.app.work_state import RunStoppedError
 from riseg_drake.pushing.push import Push
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture
@@ -68,6 +69,8 @@ class HardwareRequest:
     """Formats of other tools."""
     export_frames: tuple[int, ...] = ()
     """Numbers of the frames for Contact-GraspNet, from 0; the last one if there are none."""
+    rerun: Path | None = None
+    """File of a time line for Rerun's viewer; an empty path: in the output folder."""
 
 
 def hardware_command(request: HardwareRequest, console: Console) -> None:
@@ -81,7 +84,7 @@ def hardware_command(request: HardwareRequest, console: Console) -> None:
     name = scenario_name(request.scenario, HARDWARE)
     seed, dry_run = request.seed, request.dry_run or request.replayed
     output = request.output or Path("out") / f"{name}_{time.strftime('%Y%m%d_%H%M%S')}"
-    exports = Exports(output, request.export, request.export_frames)
+    exports, timeline = Exports(output, request.export, request.export_frames), Timeline(request.rerun, output)
     folder = RunFolder(
         output,
         {"scenario": name, "seed": seed, "dry_run": dry_run},
@@ -113,6 +116,7 @@ def hardware_command(request: HardwareRequest, console: Console) -> None:
                     console,
                     browser,
                     exports,
+                    timeline,
                 )
                 if dry_run:
                     session.run_dry(request.yes, request.replayed)
@@ -124,6 +128,7 @@ def hardware_command(request: HardwareRequest, console: Console) -> None:
             raise
     report(steps, console)
     exports.tell(console)
+    timeline.tell(console)
     if browser is not None:
         stay(browser, folder.path / REPLAY, console, request.wait, operator.wait_for_enter)
 
@@ -144,10 +149,11 @@ class _Session:
         console: Console,
         meshcat: Meshcat | None,
         exports: Exports,
+        timeline: Timeline,
     ):
         self._scenario, self._seed, self._folder = scenario, seed, folder
         self._reception, self._truth, self._operator = reception, truth, operator
-        self._console, self._meshcat, self._exports = console, meshcat, exports
+        self._console, self._meshcat, self._exports, self._timeline = console, meshcat, exports, timeline
         self._config = scenario.hardware
         self._progress, self._steps = progress, steps
         self._planned = None if meshcat is None else PlannedMotion(scenario, meshcat, reception.clock)
@@ -226,11 +232,14 @@ class _Session:
     ) -> None:
         with ExitStack() as stack:
             status = stack.enter_context(self._console.status("looking"))
-            narrator = Narrator(self._console, status)
+            narrator, clock = Narrator(self._console, status), StageClock()
+            robot = PandaKinematics(self._config.panda)
+            log = stack.enter_context(self._timeline.opened(self._folder.path.name, robot))
             listeners = [
                 lambda *_: narrator.follow(self._progress),
                 *listeners,
                 export_listener(wired, self._exports),
+                timeline_listener(wired, log, clock),
             ]
             wall = WallClock(self._reception.clock(), lambda context: self._look(look, context))
             if self._meshcat is not None:
@@ -238,7 +247,7 @@ class _Session:
                 listeners.append(lambda frame, _: kept.mark(self._progress.interaction_step, frame.time))
             for step in interactions(
                 wired,
-                StageClock(),
+                clock,
                 self._progress,
                 self._scenario.longest,
                 tuple(listeners),
@@ -248,6 +257,8 @@ class _Session:
                 self._folder.write_step(step)
                 self._steps.append(step)
                 narrator.tell_step(step)
+                if log is not None:
+                    log.take_scores(step.time, percent(step.scores))
         narrator.tell_end(self._progress)
 
     def _observation_posture(self, kinematics: PandaKinematics) -> np.ndarray:

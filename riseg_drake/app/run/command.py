@@ -24,12 +24,15 @@ from riseg_drake.app.run.recording import recording_of
 from riseg_drake.app.run.report import pooled_stages, run_report
 from riseg_drake.app.scenario import Scenario, load_scenario, scenario_name
 from riseg_drake.app.tables import score_table, stage_table
+from riseg_drake.app.timelines import Timeline, moment_of, percent
 from riseg_drake.app.work_state import end_noted
 from riseg_drake.evaluation.in_motion import pooled
 from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.systems.mask_refiner import NO_REFINED_MASK, RefinedMask
 from riseg_drake.systems.stage_clock import StageClock
+from riseg_drake.timeline.log import TimelineLog
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,8 @@ class RunRequest:
     """Formats of other tools."""
     export_frames: tuple[int, ...] = ()
     """Numbers of the frames for Contact-GraspNet, from 0; the last one if there are none."""
+    rerun: Path | None = None
+    """File of a time line for Rerun's viewer; an empty path: in the output folder."""
 
 
 def run_command(request: RunRequest, console: Console) -> None:
@@ -62,14 +67,16 @@ def run_command(request: RunRequest, console: Console) -> None:
     require_graphics()
     name = scenario_name(request.scenario)
     path, about = request.output or Path("out") / f"{name}_seed_{seed}", {"scenario": name, "seed": seed}
-    exports = Exports(path, request.export, request.export_frames)
+    exports, timeline = Exports(path, request.export, request.export_frames), Timeline(request.rerun, path)
     with RunFolder(path, about, overwrite=request.overwrite) as folder:
         console.print(f"{name}, seed {seed}, results in {folder.path}")
         browser = StartMeshcat() if request.meshcat else None
         with console.status("placing the objects") as status:
-            steps = run(scenario, seed, folder, request.record, browser, Narrator(console, status), exports)
+            narrator = Narrator(console, status)
+            steps = run(scenario, seed, folder, request.record, browser, narrator, exports, timeline)
     report(steps, console)
     exports.tell(console)
+    timeline.tell(console)
     console.print(f"to look at: {path / REPORT}", highlight=False, soft_wrap=True)
     if browser is not None:
         stay(browser, folder.path / REPLAY, console, request.wait)
@@ -83,11 +90,13 @@ def run(
     meshcat: Meshcat | None = None,
     narrator: "Narrator | None" = None,
     exports: Exports | None = None,
+    timeline: Timeline | None = None,
 ) -> list[Step]:
     """Run one scene into a folder; returns its steps. However it stops, what it leaves is whole."""
     narrator = narrator or Narrator()
-    progress = Progress()
+    progress, clock = Progress(), StageClock()
     steps: list[Step] = []
+    log: TimelineLog | None = None
     with ExitStack() as stack:
         stack.enter_context(state_of(folder, progress, steps))
         wired = make_diagram(scenario, seed, meshcat)
@@ -99,13 +108,20 @@ def run(
             listeners.append(stack.enter_context(recording))
         if exports is not None:
             listeners.append(export_listener(wired, stack.enter_context(exporting(exports, folder.note))))
+        if timeline is not None:
+            log = stack.enter_context(
+                timeline.opened(folder.path.name, PandaKinematics(scenario.station.panda))
+            )
+            listeners.append(timeline_listener(wired, log, clock))
         if meshcat is not None:
             kept = stack.enter_context(replay(meshcat, folder.path / REPLAY))
             listeners.append(lambda frame, _: kept.mark(progress.interaction_step, frame.time))
-        for step in interactions(wired, StageClock(), progress, scenario.longest, tuple(listeners)):
+        for step in interactions(wired, clock, progress, scenario.longest, tuple(listeners)):
             folder.write_step(step)
             steps.append(step)
             narrator.tell_step(step)
+            if log is not None:
+                log.take_scores(step.time, percent(step.scores))
         if progress.end:
             refined.finish()
     narrator.tell_end(progress)
@@ -115,6 +131,17 @@ def run(
 def export_listener(wired: WiredDiagram, exports: Exports) -> Listener:
     """What exports the mask of every frame."""
     return lambda _, context: exports.take(wired.segmentation(context))
+
+
+def timeline_listener(wired: WiredDiagram, log: TimelineLog | None, clock: StageClock) -> Listener:
+    """What logs every frame with the push that is under way; without a log it does nothing."""
+
+    def take(_: Frame, context: Context) -> None:
+        if log is not None:
+            moment = moment_of(lambda port: wired.read(port, context), wired.position(context), clock.seconds)
+            log.take(replace(moment, push=wired.read("active_push", context)))
+
+    return take
 
 
 def ending_figures(progress: Progress) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from riseg_drake.app.segment.recorded_view import RecordedView, recorded_view
 from riseg_drake.app.segment.replay import Replay
 from riseg_drake.app.segment.report import Album
 from riseg_drake.app.tables import score_table, stage_table
+from riseg_drake.app.timelines import Timeline, moment_of
 from riseg_drake.app.work_state import end_noted
 from riseg_drake.evaluation.scores import FIGURES, Scores, score
 from riseg_drake.host.files import MOST_SETTINGS, FileError, check_inside, read_text
@@ -36,6 +37,7 @@ from riseg_drake.recording.source_kinds import opened_source
 from riseg_drake.segmentation.table_plane import NoPlaneError
 from riseg_drake.segmentation.untouched import untouched_clusters
 from riseg_drake.systems.stage_clock import StageClock
+from riseg_drake.timeline.log import TimelineLog
 
 MOST_LINES = 10
 """More notes than this are counted on the terminal; the summary has them all."""
@@ -75,6 +77,8 @@ class SegmentRequest:
     """Formats of other tools."""
     export_frames: tuple[int, ...] = ()
     """Numbers of the frames for Contact-GraspNet, from 0; the last one if there are none."""
+    rerun: Path | None = None
+    """File of a time line for Rerun's viewer; an empty path: in the output folder."""
     strict: bool = False
     """Whether what can hardly be is an error, and not a warning."""
 
@@ -140,12 +144,13 @@ def segment_command(request: SegmentRequest, console: Console) -> None:
         "seed": seed,
     }
     output = request.output or Path("out") / f"segment_{_recording_name(request.recording)}"
-    exports = Exports(output, request.export, request.export_frames)
+    exports, timeline = Exports(output, request.export, request.export_frames), Timeline(request.rerun, output)
     clock, result = StageClock(), SegmentResult()
     with (
         SegmentFolder(output, reader.rate, about, overwrite=request.overwrite) as folder,
         _state_of(folder, result, clock),
         exporting(exports, folder.note),
+        timeline.opened(_recording_name(request.recording), view.kinematics) as log,
     ):
         what = "the sample recording" if request.recording == SAMPLE else request.recording
         console.print(f"{len(reader)} frames of {what}, results in {output}", highlight=False)
@@ -153,9 +158,10 @@ def segment_command(request: SegmentRequest, console: Console) -> None:
         console.print(
             "frames with " + ", ".join(f"{name}: {number}" for name, number in having.items()), highlight=False
         )
-        _segment(reader, view, Replay(scenario, view.view, seed), folder, exports, clock, result, console)
+        _segment(reader, view, Replay(scenario, view.view, seed), folder, exports, log, clock, result, console)
     _report(result, clock, output, console)
     exports.tell(console)
+    timeline.tell(console)
 
 
 def _segment(
@@ -164,6 +170,7 @@ def _segment(
     replay: Replay,
     folder: SegmentFolder,
     exports: Exports,
+    log: TimelineLog | None,
     clock: StageClock,
     result: SegmentResult,
     console: Console,
@@ -184,6 +191,9 @@ def _segment(
         for frame in reader:
             if _take(frame, reader, replay, folder, result):
                 exports.take(replay.segmentation, frame.name)
+                if log is not None:
+                    scores = None if frame.labels is None else result.last
+                    log.take(moment_of(replay.read, frame.position, clock.seconds, scores))
             result.left_out, result.warnings = reader.left_out, [*view.warnings, *reader.warnings]
             told.tell([*result.warnings, *map(str, result.left_out)])
             for times in clock.seconds.values():

@@ -6,7 +6,7 @@
     overlay.mp4             every frame with its objects tinted and numbered, the time and a bar of it
     report.html             what was run, what was seen before and after each change, scores, doubts and times
     scores.csv              the ten figures of every frame with a true label
-    export/                 the same in the formats of other tools, where that was asked for
+    export/, rerun.rrd      the same in the formats of other tools, where that was asked for
 
 Whenever it is stopped, the masks that are there are whole, and the summary says how many they are.
 """
@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from riseg_drake.app.exports import EXPORT
 from riseg_drake.app.output_folder import OutputError, OutputFolder
 from riseg_drake.app.report_page import REPORT
+from riseg_drake.app.timelines import FILE
 from riseg_drake.evaluation.scores import Scores
 from riseg_drake.host.processes import undisturbed
 from riseg_drake.pictures.masks import draw_masks
@@ -40,7 +41,7 @@ COMMAND = "segment"
 LONGEST_NAME = 50
 """Characters of a mask's name: as many bytes as any file system takes, whatever they are."""
 _UNFINISHED_VIDEO = ".overlay.unfinished.mp4"
-PARTS = "|".join(map(re.escape, (MASKS, UNTOUCHED, VIDEO, SCORES, REPORT, EXPORT, _UNFINISHED_VIDEO)))
+PARTS = "|".join(map(re.escape, (MASKS, UNTOUCHED, VIDEO, SCORES, REPORT, EXPORT, FILE, _UNFINISHED_VIDEO)))
 """What a segmentation puts into its folder, beside the summary."""
 
 

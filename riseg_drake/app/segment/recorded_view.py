@@ -1,6 +1,7 @@
 """Who says where a recording's camera was and what the robot hid: its joints, its files, or nobody."""
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,6 +37,8 @@ class RecordedView:
     """The camera's pose at joint angles; None where it follows from none."""
     robot_mask: Callable[[NDArray], NDArray] | None = None
     """The robot's own pixels at joint angles; None where they follow from none."""
+    kinematics: Kinematics | None = None
+    """The robot that carries the camera; None where none is known."""
 
     def frame(self, recorded: RecordedFrame) -> Frame:
         """A recorded frame as the algorithm sees it, but for its number."""
@@ -83,10 +86,14 @@ def recorded_view(
     kinematics = _kinematics(reader, number, scenario, robot, camera_frame)
     warnings = []
     try:
-        robot_mask, source = RobotSilhouette(kinematics, reader.intrinsics).mask, reader.joints.path.name
+        with nullcontext() if robot is None else reading_model(robot):
+            robot_mask = RobotSilhouette(kinematics, reader.intrinsics).mask
+        source = reader.joints.path.name
     except UnknownShapeError as error:
         robot_mask, source = None, f"{layout.ROBOT_FOLDER}/" if masks else "none"
         warnings.append(f"{robot}: {error}; robot masks: {source}")
+    except ModelFileError as error:
+        raise OwnRobotError(f"{robot}: {error}; --robot names a URDF or SDF file") from None
     return RecordedView(
         FrameView(reader.intrinsics, kinematics.X_WC, robot_mask, number),
         camera_poses=reader.joints.path.name,
@@ -94,6 +101,7 @@ def recorded_view(
         warnings=warnings,
         X_WC=kinematics.X_WC,
         robot_mask=robot_mask,
+        kinematics=kinematics,
     )
 
 

@@ -1,6 +1,7 @@
 """A recording put through Alg. 2: the same systems, wired in the same way, without a robot."""
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,10 +54,14 @@ class Replay:
             raise
         return self._diagram.GetOutputPort("mask").Eval(context)
 
+    def read(self, port: str) -> Any:
+        """What the last frame left at an output of `segmentation_block`."""
+        return self._diagram.GetOutputPort(port).Eval(self._simulator.get_context())
+
     @property
     def segmentation(self) -> Segmentation:
         """What the last frame left: the mask, and which objects are known."""
-        return self._diagram.GetOutputPort("segmentation").Eval(self._simulator.get_context())
+        return self.read("segmentation")
 
 
 def _fix_inputs(diagram: Diagram, context: Context, frame: RecordedFrame) -> None:

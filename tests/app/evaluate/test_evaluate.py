@@ -87,6 +87,7 @@ def test_scene_k_has_the_seed_s_plus_k_and_a_folder_of_its_own(tmp_path, scenes_
     assert {path.name for path in tmp_path.iterdir()} == {
         *(f"scene_00{k}" for k in range(3)),
         "report.md",
+        "report.html",
         "figure.png",
         "summary.json",
     }

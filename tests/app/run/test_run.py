@@ -22,7 +22,7 @@ STAGES = ("FrameView", "ObjectsAboveTable", "ExpectedFlow", "OpticalFlow", "BFIF
 @pytest.fixture(scope="module")
 def finished(small_scenario, tmp_path_factory):
     folder = tmp_path_factory.mktemp("finished")
-    words = ["--seed", "1", "--record", "--export", "contact_graspnet,motions", "--output", str(folder)]
+    words = ["--seed", "1", "--record", "--export", "npz,poses", "--output", str(folder)]
     assert main(["run", str(small_scenario), *words]) == 0
     return folder
 
@@ -89,7 +89,7 @@ def test_the_area_that_is_left_at_the_end_is_that_of_what_is_not_segmented(finis
 
 
 def test_the_frame_that_is_exported_is_the_last_one_that_was_recorded_with_its_mask(finished):
-    (file,) = (finished / "export" / "contact_graspnet").iterdir()
+    (file,) = (finished / "export" / "npz").iterdir()
     last = sorted((finished / "recording" / "rgb").iterdir())[-1]
     assert file.stem == last.stem
     with np.load(file) as data:
@@ -97,7 +97,7 @@ def test_the_frame_that_is_exported_is_the_last_one_that_was_recorded_with_its_m
         np.testing.assert_array_equal(data["segmap"], read(finished / "step_1" / "mask.png"))
     ids = np.unique(read(finished / "step_1" / "mask.png")).tolist()[1:]
     assert {f"object_{a}.txt" for a in ids} == {p.name for p in (finished / "export" / "motions").iterdir()}
-    assert summary(finished)["exports"] == ["contact_graspnet", "motions"]
+    assert summary(finished)["exports"] == ["npz", "poses"]
 
 
 def test_before_the_first_push_the_mask_is_empty(finished):

@@ -1,6 +1,6 @@
 """The motion of each object, as far as the segmentation knows it: a poses file in the layout of TUM RGB-D.
 
-    motions/object_3.txt     lines: timestamp tx ty tz qx qy qz qw
+    poses/object_3.txt     lines: timestamp tx ty tz qx qy qz qw
 
 The object's frame B has the axes of W at the first line, and its origin is the middle of the points that were
 seen of it then; each line is its pose since, X_B0B: the first is the identity. The file's head gives p_WB of
@@ -27,7 +27,7 @@ def relative_poses(
     return {time: inverse(X_WB0) @ X_W @ X_WB0 for time, X_W in track.items()}
 
 
-def write_motions(folder: Path, displacements: Displacements, ids: Collection[int]) -> list[str]:
+def write_poses(folder: Path, displacements: Displacements, ids: Collection[int]) -> list[str]:
     """Write a file for each of some ids whose motion is known; returns a line for each of the others.
 
     Raises OSError where they cannot be written.
@@ -47,7 +47,7 @@ def write_motions(folder: Path, displacements: Displacements, ids: Collection[in
         folder.mkdir(parents=True, exist_ok=True)
         write_text(folder / f"object_{a}.txt", "\n".join(lines) + "\n")
     return [
-        f"motions: no file for object {a}: the segmentation knows no motion of it"
+        f"poses: no file for object {a}: the segmentation knows no motion of it"
         for a in ids
         if a not in displacements.tracks
     ]

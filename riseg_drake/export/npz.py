@@ -1,6 +1,6 @@
 """Contact-GraspNet: an npz file for its `inference.py --np_path`.
 
-    contact_graspnet/000123.npz     depth, K, segmap, rgb
+    npz/000123.npz     depth, K, segmap, rgb
 
 Keys and units are those that `load_available_input_data` in its contact_graspnet/data.py reads: depth in
 metres, K [3, 3], segmap with 0 for what is no object. It swaps red and blue of what it finds under `rgb`, so
@@ -17,7 +17,7 @@ from riseg_drake.export.segmented_frame import SegmentedFrame, camera_matrix
 from riseg_drake.recording.whole_file import write_bytes
 
 
-class ContactGraspNetExport:
+class NpzExport:
     """Writes some frames, by their number, or the last one. Raises OSError where it cannot."""
 
     def __init__(self, folder: Path, numbers: Collection[int] = ()):
@@ -39,10 +39,10 @@ class ContactGraspNetExport:
             return []
         if self._wants_last:
             self._write(self._last)
-            return [f"contact_graspnet: the last frame, number {self._last.number} at {self._last.time:g} s"]
+            return [f"npz: the last frame, number {self._last.number} at {self._last.time:g} s"]
         if self._missing:
             missing = ", ".join(map(str, sorted(self._missing)))
-            return [f"contact_graspnet: no frame {missing}; they go from 0 to {self._last.number}"]
+            return [f"npz: no frame {missing}; they go from 0 to {self._last.number}"]
         return []
 
     def _write(self, frame: SegmentedFrame) -> None:

@@ -1,12 +1,12 @@
 import cv2
 import numpy as np
 
-from riseg_drake.export.contact_graspnet import ContactGraspNetExport
+from riseg_drake.export.npz import NpzExport
 from tests.export.segmented_frames import FRAMES
 
 
 def exported(folder, *numbers):
-    export = ContactGraspNetExport(folder, numbers)
+    export = NpzExport(folder, numbers)
     for frame in FRAMES:
         export.take(frame)
     notes = export.finish()
@@ -28,10 +28,10 @@ def test_a_file_holds_what_its_inference_reads_in_metres_with_the_mask_and_colou
 def test_unless_frames_are_named_it_is_the_last_one_and_that_is_said(tmp_path):
     files, (note,) = exported(tmp_path)
     assert files == ["000003.npz"]
-    assert note == "contact_graspnet: the last frame, number 3 at 1.7 s"
+    assert note == "npz: the last frame, number 3 at 1.7 s"
 
 
 def test_a_frame_that_never_came_is_named(tmp_path):
     files, notes = exported(tmp_path, 0, 3, 7, 9)
     assert files == ["000000.npz", "000003.npz"]
-    assert notes == ["contact_graspnet: no frame 7, 9; they go from 0 to 3"]
+    assert notes == ["npz: no frame 7, 9; they go from 0 to 3"]
