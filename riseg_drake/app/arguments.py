@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from riseg_drake.app import commands
+from riseg_drake.app.camera_options import add_drive_camera_options
 from riseg_drake.app.export_options import add_export
 from riseg_drake.app.options import add_overwrite, add_scenario, add_source, add_view, positive, seed_number
 from riseg_drake.app.package import package_version
@@ -125,6 +126,16 @@ def command_line() -> argparse.ArgumentParser:
     hand_eye.add_argument("--output", type=Path, metavar="DIR", help="folder for pictures (out/hand_eye)")
     add_overwrite(hand_eye, "check")
     hand_eye.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
+
+    add_drive_camera_options(
+        _add(
+            subparsers,
+            "drive-camera",
+            commands.drive_camera,
+            "Publish colour and aligned depth of a RealSense camera, or of its file, on LCM until Ctrl-C.\n"
+            "Prints the camera's intrinsics as the scenario wants them.",
+        )
+    )
 
     emulate = _add(
         subparsers,

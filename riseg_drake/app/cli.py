@@ -88,6 +88,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.stations.misbehaviour import WordError
     from riseg_drake.stations.object_models import SceneError
     from riseg_drake.stations.physics import PhysicsError
+    from riseg_drake.stations.realsense import RealSenseError
 
     return (
         OSError,
@@ -104,6 +105,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
         EvaluationError,
         PoolError,
         LcmError,
+        RealSenseError,
         ImageError,
         CommandError,
         HardwareError,

@@ -65,12 +65,13 @@ class BagReader(RecordedSource):
             self._color, self._depth = chosen_pair(
                 _images(bag, options.topics), options.topics, self._transforms.connected, str(path)
             )
-            self._registration = self._registered(self._color, self._depth)
+            self.registration = self._registered(self._color, self._depth)
+            """How its images become those of one pinhole."""
             self._unit = bag.depth_unit(self._depth.name)
             self.depth_scale = float(1 / Decimal(str(self._unit)))
             self._read_stamps(bag)
             self._find_joints(bag)
-        self.intrinsics = self._registration.intrinsics
+        self.intrinsics = self.registration.intrinsics
         self.warnings += [f"{path}: {odd}" for odd in unlikely_camera(self.intrinsics)]
         self.camera_poses = self._find_poses(bag)
         self._frames = self._associated()
@@ -111,8 +112,8 @@ class BagReader(RecordedSource):
         image = color_image(color, name)
         metres = depth_image(depth, f"{self._depth.name} at {seconds!r} s", self._unit)
         for found, right in (
-            (image.shape[:2], self._registration.color.intrinsics.shape),
-            (metres.shape, self._registration.depth_shape),
+            (image.shape[:2], self.registration.color.intrinsics.shape),
+            (metres.shape, self.registration.depth_shape),
         ):
             if found != right:
                 raise DamagedImageError(
@@ -120,8 +121,8 @@ class BagReader(RecordedSource):
                 )
         return RecordedFrame(
             time=seconds,
-            color=self._registration.registered_color(image),
-            depth=self._registration.registered_depth(metres),
+            color=self.registration.registered_color(image),
+            depth=self.registration.registered_depth(metres),
             X_WC=self._pose_at(seconds),
             position=None if self.joints is None else row_between(self.joints, seconds, limit),
             name=f"{number - 1:06d}.png",

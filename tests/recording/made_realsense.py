@@ -1,14 +1,18 @@
 """RealSense files for tests, recorded by librealsense itself from frames that a software device gives it."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
+from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyrealsense2 as rs
 
 from riseg_drake.geometry.camera import Intrinsics
 
+MOST_PLAYED = 10
+"""Times a file is played."""
 EPOCH = 1.7e9
 """s; the first frame's time."""
 
@@ -86,7 +90,19 @@ class SoftwareCamera:
 
 
 def record(path: Path, kind: RealSenseKind, frames: Iterable[tuple[np.ndarray, np.ndarray]]) -> Path:
-    """A file of (colour, depth) frames; the suffix must be that which this version of librealsense writes."""
+    """A file of (colour, depth) frames; the suffix must be that which this version of librealsense writes.
+
+    In a process of its own: librealsense's threads let go of Python's images when they please, and wait for
+    Python's lock then with locks of their own.
+    """
+    process = get_context("spawn").Process(target=_record, args=(path, kind, list(frames)), daemon=True)
+    process.start()
+    process.join(60)
+    assert process.exitcode == 0, f"librealsense did not record: {process.exitcode}"
+    return path
+
+
+def _record(path: Path, kind: RealSenseKind, frames: list[tuple[np.ndarray, np.ndarray]]) -> None:
     camera = SoftwareCamera(kind)
     recorder = rs.recorder(str(path), camera.device, kind.compressed)
     queue, sensors = rs.frame_queue(8), recorder.query_sensors()
@@ -100,35 +116,50 @@ def record(path: Path, kind: RealSenseKind, frames: Iterable[tuple[np.ndarray, n
     for sensor in sensors:
         sensor.stop()
         sensor.close()
-    return path
 
 
-def aligned_by_librealsense(path: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """(colour [H, W, 3], aligned depth [H, W] in units) of a file that librealsense plays and aligns."""
-    device = rs.context().load_device(str(path))
+def aligned_by_librealsense(path: Path, count: int) -> list[tuple[np.ndarray, np.ndarray]]:
+    """(colour [H, W, 3], aligned depth [H, W] in units) of a short file that librealsense plays and aligns.
+
+    At the end of a file librealsense drops some images, others each time: it is played until all have come.
+    """
+    devices: list[Any] = []  # images are theirs
+    depths: dict[int, Any] = {}
+    colors: dict[int, Any] = {}
+    for _ in range(MOST_PLAYED):
+        devices.append(rs.context().load_device(str(path)))
+        for frame in _played(devices[-1]):
+            (depths if frame.is_depth_frame() else colors)[frame.get_frame_number() - 1] = frame
+        if len(depths.keys() & colors.keys()) == count:
+            break
+    # All that is played is here before anything of Python is called: see `record`.
+    joined, pair = rs.frame_queue(1), []
+    join = rs.processing_block(lambda frame, source: source.frame_ready(source.allocate_composite_frame(pair)))
+    join.start(joined)
+    align, aligned = rs.align(rs.stream.color), []
+    for number in range(count):
+        pair[:] = [depths[number], colors[number]]
+        join.invoke(pair[0])
+        both = align.process(joined.wait_for_frame(1000).as_frameset())
+        frames = (both.get_color_frame(), both.get_depth_frame())
+        aligned.append(tuple(np.asanyarray(frame.get_data()).copy() for frame in frames))
+    return aligned
+
+
+def _played(device: Any) -> list[Any]:
     device.set_real_time(False)
-    queue, sensors = rs.frame_queue(4, keep_frames=True), device.query_sensors()
+    queue, sensors = rs.frame_queue(200, keep_frames=True), device.query_sensors()
     for sensor in sensors:
         sensor.open(sensor.get_stream_profiles())
     for sensor in sensors:
         sensor.start(queue)
-    align, waiting, joined = rs.align(rs.stream.color), [], rs.frame_queue(1)
-    together = rs.processing_block(
-        lambda frame, source: source.frame_ready(source.allocate_composite_frame(waiting))
-    )
-    together.start(joined)
-    while True:
-        came, frame = queue.try_wait_for_frame(1000)
-        if not came:
-            break
-        waiting.append(frame)
-        if len(waiting) == 2:
-            together.invoke(frame)
-            both = align.process(joined.wait_for_frame(1000).as_frameset())
-            yield tuple(
-                np.asanyarray(f.get_data()).copy() for f in (both.get_color_frame(), both.get_depth_frame())
-            )
-            waiting.clear()
+    played = []
+    while (frame := queue.try_wait_for_frame(500))[0]:
+        played.append(frame[1])
+    for sensor in sensors:
+        sensor.stop()
+        sensor.close()
+    return played
 
 
 def _stream(kind, uid: int, size: int, format, intrinsics):

@@ -137,7 +137,7 @@ def test_alignment_agrees_with_that_of_librealsense_in_99_percent_of_pixels(tmp_
     drawn, _ = scene.frame(0, looking_down(), bodies, rng)
     color = np.zeros((*kind.color.shape, 3), np.uint8)
     file = record(tmp_path / "film.db3", kind, [(color, millimetres(drawn))])
-    ((_, theirs),) = aligned_by_librealsense(file)
+    ((_, theirs),) = aligned_by_librealsense(file, 1)
     (ours,) = opened(file)
     apart = np.abs(ours.depth - theirs * np.float32(0.001))
     assert np.mean(apart <= limit) >= 0.99
@@ -156,7 +156,7 @@ def test_lenses_project_as_librealsense_projects(tmp_path, model):
         kind,
         [(np.zeros((*kind.color.shape, 3), np.uint8), np.full((480, 848), 500, np.uint16))],
     )
-    lens = opened(file)._registration.color
+    lens = opened(file).registration.color
     np.testing.assert_allclose(lens.distortion, distortion, atol=1e-8)
     uv = np.array([[20.0, 30.0], [212.0, 100.0], [800.0, 440.0]])
     right = realsense_intrinsics(kind.color, model, distortion)
@@ -167,7 +167,7 @@ def test_lenses_project_as_librealsense_projects(tmp_path, model):
 def test_a_fisheye_is_opencvs_and_a_lens_that_opencv_does_not_know_is_said(tmp_path):
     blank = [(np.zeros((*SMALL.shape, 3), np.uint8), np.full(SMALL.shape, 500, np.uint16))]
     kind = RealSenseKind(SMALL, SMALL, model="kannala_brandt4", distortion=(0.02, -0.01, 0.003, 0.001, 0.0))
-    lens = opened(record(tmp_path / "fisheye.db3", kind, blank))._registration.color
+    lens = opened(record(tmp_path / "fisheye.db3", kind, blank)).registration.color
     assert lens.fisheye
     uv = np.array([[20.0, 30.0], [140.0, 100.0]])
     right = realsense_intrinsics(SMALL, kind.model, kind.distortion)
