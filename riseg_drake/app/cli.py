@@ -81,6 +81,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.export.export_error import ExportError
     from riseg_drake.learned.model_error import ModelError
     from riseg_drake.recording.layout import RecordingError
+    from riseg_drake.robot.camera_calibration import CalibrationError
     from riseg_drake.robot.own_robot import OwnRobotError
     from riseg_drake.stations.command_process import CommandError
     from riseg_drake.stations.lcm_channels import LcmError
@@ -106,6 +107,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
         PoolError,
         LcmError,
         RealSenseError,
+        CalibrationError,
         ImageError,
         CommandError,
         HardwareError,
