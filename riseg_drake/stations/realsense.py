@@ -155,7 +155,7 @@ class LibrealsenseAlignment:
         self._sensor.open(self._profiles)
         self._sensor.start(self._frames)
         k = color.intrinsics
-        self._images = [None, np.zeros((k.height, k.width, 3), np.uint8)]
+        self._black = np.zeros((k.height, k.width, 3), np.uint8)
         self._number = 0
 
     def __call__(self, depth: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -164,7 +164,7 @@ class LibrealsenseAlignment:
         units = np.clip(np.rint(depth / self._unit), 0, _TOO_FAR).astype(np.uint16)
         self._pair[:] = [
             self._given(profile, pixels)
-            for profile, pixels in zip(self._profiles, (units, self._images[1]), strict=True)
+            for profile, pixels in zip(self._profiles, (units, self._black), strict=True)
         ]
         self._joiner.invoke(self._pair[0])
         aligned = self._align.process(self._joined.wait_for_frame().as_frameset())
@@ -188,8 +188,8 @@ def opened_camera(serial: str | None, size: tuple[int, int], config: CameraDrive
     devices = {_info(rs, device, "serial_number"): device for device in rs.context().query_devices()}
     if not devices:
         raise RealSenseError(
-            "no RealSense camera is found: plug it into a USB 3 port, and let your user open it (its "
-            "99-realsense-libusb.rules in /etc/udev/rules.d)"
+            "no RealSense camera is found: plug it into a USB 3 port, and let your user open it "
+            "(librealsense's 99-realsense-libusb.rules in /etc/udev/rules.d)"
         )
     if serial is None and len(devices) > 1:
         raise RealSenseError(f"there are the cameras {', '.join(devices)}; name one by lcm.camera_serial")
@@ -207,7 +207,8 @@ def opened_camera(serial: str | None, size: tuple[int, int], config: CameraDrive
 def set_up(device: Any, config: CameraDriverConfig) -> list[str]:
     """Make the settings that a device has; returns the names of those that it lacks. Raises RealSenseError."""
     rs, lacking = librealsense(), []
-    sensors = list(device.query_sensors())
+    # Some cameras have a sensor of motion besides.
+    sensors = [each for each in device.query_sensors() if each.is_depth_sensor() or each.is_color_sensor()]
     for sensor in sensors:
         stereo = bool(sensor.is_depth_sensor())
         exposure = config.depth_exposure if stereo else config.color_exposure
@@ -239,7 +240,10 @@ def _info(rs: Any, device: Any, key: str) -> str:
 
 
 def lens_of(k: Any) -> Lens:
-    """The lens of librealsense's intrinsics; its models project as OpenCV's do."""
+    """The lens of librealsense's intrinsics; its models project as OpenCV's do.
+
+    Raises RealSenseError for a model that OpenCV does not have.
+    """
     intrinsics = Intrinsics(k.width, k.height, *(float(v) for v in (k.fx, k.fy, k.ppx, k.ppy)))
     model, distortion = str(k.model).rsplit(".", 1)[-1], tuple(float(c) for c in k.coeffs)
     if not any(distortion):

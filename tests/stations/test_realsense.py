@@ -116,8 +116,11 @@ def test_without_librealsense_the_remedy_is_said(monkeypatch):
 class Sensor:
     """Notes what it is told."""
 
-    def __init__(self, stereo, lacks=()):
-        self.stereo, self.lacks, self.told = stereo, lacks, []
+    def __init__(self, stereo, lacks=(), moves=False):
+        self.stereo, self.lacks, self.moves, self.told = stereo, lacks, moves, []
+
+    def is_color_sensor(self):
+        return not self.stereo and not self.moves
 
     def is_depth_sensor(self):
         return self.stereo
@@ -130,8 +133,8 @@ class Sensor:
 
 
 def test_settings_are_made_in_the_units_of_the_camera():
-    stereo, color = Sensor(True), Sensor(False)
-    device = SimpleNamespace(query_sensors=lambda: [stereo, color])
+    stereo, color, motion = Sensor(True), Sensor(False), Sensor(False, moves=True)
+    device = SimpleNamespace(query_sensors=lambda: [stereo, color, motion])
     config = CameraDriverConfig(
         color_exposure=0.0125, depth_exposure=0.0085, emitter=False, preset="high_accuracy"
     )
@@ -144,6 +147,7 @@ def test_settings_are_made_in_the_units_of_the_camera():
         ("exposure", 8500),
     ]
     assert color.told == [("global_time_enabled", 1), ("enable_auto_exposure", 0), ("exposure", 125)]
+    assert motion.told == []
 
 
 def test_a_camera_with_one_sensor_takes_colours_exposure_by_it_and_what_it_lacks_is_named():

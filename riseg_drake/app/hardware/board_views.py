@@ -63,7 +63,10 @@ def record_views(
     config: HardwareStationConfig,
     console: Console,
 ) -> None:
-    """Write views that show the board, of an arm that stands still, for as long as it goes on."""
+    """Write views that show the board, of an arm that stands still, for as long as it goes on.
+
+    Raises RecordingError for a folder that is not new.
+    """
     if folder.exists() and any(folder.iterdir()):
         raise RecordingError(f"{folder} is not empty; give a new folder")
     (folder / layout.COLOR_FOLDER).mkdir(parents=True, exist_ok=True)
