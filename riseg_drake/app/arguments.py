@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from riseg_drake.app import commands
+from riseg_drake.app.camera_options import add_calibrate_options, add_drive_camera_options
 from riseg_drake.app.export_options import add_export
 from riseg_drake.app.options import (
     add_overwrite,
@@ -135,6 +136,26 @@ def command_line() -> argparse.ArgumentParser:
     hand_eye.add_argument("--output", type=Path, metavar="DIR", help="folder for pictures (out/hand_eye)")
     add_overwrite(hand_eye, "check")
     hand_eye.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
+
+    add_calibrate_options(
+        _add(
+            subparsers,
+            "calibrate",
+            commands.calibrate,
+            "Find where the camera is on the arm, or in the world, by views of a ChArUco or AprilTag board.\n"
+            "Prints the scenario's lines, how sure they are, and where the board lies.",
+        )
+    )
+
+    add_drive_camera_options(
+        _add(
+            subparsers,
+            "drive-camera",
+            commands.drive_camera,
+            "Publish colour and aligned depth of a RealSense camera, or of its file, on LCM until Ctrl-C.\n"
+            "Prints the camera's intrinsics as the scenario wants them.",
+        )
+    )
 
     emulate = _add(
         subparsers,

@@ -81,6 +81,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.export.export_error import ExportError
     from riseg_drake.learned.model_error import ModelError
     from riseg_drake.recording.layout import RecordingError
+    from riseg_drake.robot.camera_calibration import CalibrationError
     from riseg_drake.robot.own_robot import OwnRobotError
     from riseg_drake.stations.command_process import CommandError
     from riseg_drake.stations.lcm_channels import LcmError
@@ -88,6 +89,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.stations.misbehaviour import WordError
     from riseg_drake.stations.object_models import SceneError
     from riseg_drake.stations.physics import PhysicsError
+    from riseg_drake.stations.realsense import RealSenseError
     from riseg_drake.timeline.file import TimelineError
 
     return (
@@ -105,6 +107,8 @@ def _mistakes() -> tuple[type[Exception], ...]:
         EvaluationError,
         PoolError,
         LcmError,
+        RealSenseError,
+        CalibrationError,
         ImageError,
         CommandError,
         HardwareError,

@@ -70,6 +70,21 @@ def hand_eye(chosen: argparse.Namespace, console: Console) -> None:
     hand_eye_command(chosen.scenario, chosen.output, chosen.yes, chosen.overwrite, console)
 
 
+def calibrate(chosen: argparse.Namespace, console: Console) -> None:
+    """`riseg calibrate`."""
+    from riseg_drake.app.hardware.calibrate import CalibrateRequest, calibrate_command
+
+    calibrate_command(_request(CalibrateRequest, chosen), console)
+
+
+def drive_camera(chosen: argparse.Namespace, console: Console) -> None:
+    """`riseg drive-camera`."""
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    from riseg_drake.app.hardware.drive_camera import drive_camera_command
+
+    drive_camera_command(chosen.scenario, chosen.file, console)
+
+
 def emulate(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg emulate`."""
     from riseg_drake.app.emulate import emulate_command

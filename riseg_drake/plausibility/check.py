@@ -64,6 +64,13 @@ def doubts(
     ]
 
 
+def looked_at(count: int) -> list[int]:
+    """The numbers of the frames that `doubts` reads of so many, for who must read them one after the other."""
+    if count < 2:
+        return []
+    return sorted({min(n + apart, count - 1) for n in _moments(count) for apart in (0, 1, _APART)})
+
+
 def _moments(count: int) -> Sequence[int]:
     """Numbers of frames spread over a recording, each with others after it."""
     last = max(count - 1 - _APART, min(count - 2, _MOMENTS - 1))

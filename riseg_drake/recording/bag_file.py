@@ -1,66 +1,24 @@
-"""The door to the library that reads bags: messages in the order in which they were recorded."""
+"""The door to the library that reads bags."""
 
-import struct
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from riseg_drake.host.files import MOST_SETTINGS, FileError, is_file, read_text
+from riseg_drake.recording.bag_messages import BagMessages
 from riseg_drake.recording.layout import RecordingError
+from riseg_drake.recording.realsense_file import RealSenseFile, is_realsense
 
 EXTRA = "pip install 'riseg-drake[bags]'"
 SUFFIXES = (".bag", ".db3", ".mcap")
 """Of files with recorded messages."""
 METADATA = "metadata.yaml"
 """In the folder of a bag of ROS 2."""
-_CUT = 4
-"""Bytes that RealSense files have behind the messages of their images."""
-
-
-class BagFile:
-    """An open bag of ROS 1 or ROS 2. Use `opened_bag`."""
-
-    def __init__(self, path: Path, reader: Any):
-        self.path = path
-        self._reader = reader
-        self.types = {c.topic: str(c.msgtype).rsplit("/", 1)[-1] for c in reader.connections if c.msgcount}
-        """The short name of the messages' type, by topic."""
-
-    def messages(self, topics: Iterable[str]) -> Iterator[tuple[str, int, bytes]]:
-        """(topic, ns at which it was recorded, message as bytes), in rising time."""
-        wanted = set(topics)
-        connections = [c for c in self._reader.connections if c.topic in wanted]
-        if connections:
-            for connection, time, raw in self._reader.messages(connections):
-                yield connection.topic, time, raw
-
-    def first(self, topic: str) -> Any:
-        """The first message of a topic that has some."""
-        messages = self.messages([topic])
-        _, _, raw = next(messages)
-        messages.close()  # type: ignore[attr-defined]
-        return self.message(topic, raw)
-
-    def message(self, topic: str, raw: bytes) -> Any:
-        """A message with its fields."""
-        connection = next(c for c in self._reader.connections if c.topic == topic)
-        if topic.startswith("/device_") and connection.msgtype == "sensor_msgs/msg/Image":
-            raw = raw[:-_CUT]
-        return self._reader.deserialize(raw, connection.msgtype)
-
-    def header_time(self, raw: bytes, recorded: int) -> int:
-        """The stamp of a message that begins with a header, ns; where that is 0, when it was recorded."""
-        if self._reader.is2:
-            seconds, nanoseconds = struct.unpack_from("<iI" if raw[1] & 1 else ">iI", raw, 4)
-        else:
-            seconds, nanoseconds = struct.unpack_from("<II", raw, 4)
-        return seconds * 10**9 + nanoseconds or recorded
 
 
 @contextmanager
-def opened_bag(path: Path) -> Iterator[BagFile]:
-    """A bag: a file of ROS 1 or ROS 2, or the folder of one of ROS 2.
+def opened_bag(path: Path) -> Iterator[BagMessages]:
+    """A bag: a file of ROS 1, of ROS 2 or of a RealSense camera, or the folder of one of ROS 2.
 
     Raises RecordingError for one that cannot be read, also while it is read, and where the library is missing.
     """
@@ -73,7 +31,8 @@ def opened_bag(path: Path) -> Iterator[BagFile]:
     try:
         # Bags of ROS 2 may not say what their messages are made of; the common ones are the same since Humble.
         with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
-            yield BagFile(path, reader)
+            topics = [connection.topic for connection in reader.connections]
+            yield (RealSenseFile if is_realsense(topics) else BagMessages)(path, reader)
     except RecordingError:
         raise
     except MemoryError:  # damaged sizes are asked for as they stand

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from riseg_drake.geometry.rgbd import sanitize_depth
 from riseg_drake.host.images import MOST_PIXELS, DamagedImageError, decode, image_kind
+from riseg_drake.recording.bag_messages import MILLIMETRE
 
 COLOR_ENCODINGS = {
     "rgb8": (3, None),
@@ -24,12 +25,12 @@ COLOR_ENCODINGS = {
     "uyvy": (2, cv2.COLOR_YUV2RGB_UYVY),
     "yuv422_yuy2": (2, cv2.COLOR_YUV2RGB_YUYV),
     "yuyv": (2, cv2.COLOR_YUV2RGB_YUYV),
+    "YUYV": (2, cv2.COLOR_YUV2RGB_YUYV),
+    "UYVY": (2, cv2.COLOR_YUV2RGB_UYVY),
 }
-"""Bytes of a pixel, and how OpenCV makes RGB of it."""
+"""Bytes of a pixel, and how OpenCV makes RGB of it; the last two as RealSense files call them."""
 DEPTH_ENCODINGS = {"16UC1": np.uint16, "mono16": np.uint16, "32FC1": np.float32}
 """Whole millimetres, or metres (REP 118)."""
-MILLIMETRE = np.float32(1 / 1000.0)
-"""m, as the reader of folders has it."""
 _INVALID = 65535
 _DEPTH_HEADER = struct.Struct("<iff")
 """What compressedDepth puts before a PNG: its format, and two numbers of the scale of 32FC1."""
@@ -57,8 +58,10 @@ def is_depth(message: Any, topic: str) -> bool:
     """Whether an image holds distances. One of 16 gray levels bits does if its topic says so."""
     encoding = encoding_of(message)
     if is_compressed(message):
-        return encoding.startswith(("16UC1", "32FC1", "mono16")) or "compressedDepth" in encoding
-    return encoding in ("16UC1", "32FC1") or (encoding == "mono16" and "depth" in topic.lower())
+        sure = encoding.startswith(("16UC1", "32FC1")) or "compressedDepth" in encoding
+    else:
+        sure = encoding in ("16UC1", "32FC1")
+    return sure or (encoding.startswith("mono16") and "depth" in topic.lower())
 
 
 def is_color(message: Any) -> bool:
@@ -86,25 +89,28 @@ def color_image(message: Any, name: str) -> NDArray[np.uint8]:
     return cv2.cvtColor(image if channels > 1 else image[..., 0], conversion).astype(np.uint8, copy=False)
 
 
-def depth_image(message: Any, name: str) -> NDArray[np.float32]:
-    """Depth [H, W], m, 0 = invalid, of a message. Raises DamagedImageError with the name that is given."""
+def depth_image(message: Any, name: str, unit: np.float32 = MILLIMETRE) -> NDArray[np.float32]:
+    """Depth [H, W], m, 0 = invalid, of a message; `unit` is what 1 stands for in whole numbers, m.
+
+    Raises DamagedImageError with the name that is given.
+    """
     if is_compressed(message):
-        return _compressed_depth(message.data.tobytes(), encoding_of(message), name)
+        return _compressed_depth(message.data.tobytes(), encoding_of(message), name, unit)
     if message.encoding not in DEPTH_ENCODINGS:
         raise DamagedImageError(f"{name} has the encoding {message.encoding!r}, which is no depth")
     kind = np.dtype(DEPTH_ENCODINGS[message.encoding])
     image = _pixels(message, kind.newbyteorder(">" if message.is_bigendian else "<"), 1, name)[..., 0]
-    return _metres(image.astype(kind))
+    return _metres(image.astype(kind), unit)
 
 
-def _compressed_depth(content: bytes, encoding: str, name: str) -> NDArray[np.float32]:
+def _compressed_depth(content: bytes, encoding: str, name: str, unit: np.float32) -> NDArray[np.float32]:
     if "rvl" in encoding.lower():
         raise DamagedImageError(f"{name} is compressed as RVL; compressedDepth is read as PNG")
     image = decode(_picture(content), name)
     if image.dtype != np.uint16 or image.ndim != 2:
         raise DamagedImageError(f"{name} is no depth image of 16 bits")
     if not encoding.startswith("32FC1"):
-        return _metres(image)
+        return _metres(image, unit)
     if image_kind(content) is not None:
         raise DamagedImageError(f"{name} lacks the header of compressedDepth, which has its scale")
     _, a, b = _DEPTH_HEADER.unpack_from(content)
@@ -120,11 +126,11 @@ def _picture(content: bytes) -> bytes:
     return content if image_kind(content) is not None else content[_DEPTH_HEADER.size :]
 
 
-def _metres(image: NDArray) -> NDArray[np.float32]:
+def _metres(image: NDArray, unit: np.float32) -> NDArray[np.float32]:
     if image.dtype == np.float32:
         return sanitize_depth(image)
     # A product, as depth sensors and Drake make it: a quotient can differ in the last bit.
-    return sanitize_depth(np.where(image == _INVALID, 0, image).astype(np.float32) * MILLIMETRE)
+    return sanitize_depth(np.where(image == _INVALID, 0, image).astype(np.float32) * unit)
 
 
 def _pixels(message: Any, kind: np.dtype, channels: int, name: str) -> NDArray:

@@ -2,7 +2,8 @@
 
 from array import array
 from collections import Counter, deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.host.images import DamagedImageError
-from riseg_drake.recording.bag_file import BagFile, opened_bag
+from riseg_drake.recording.bag_file import opened_bag
 from riseg_drake.recording.bag_images import color_image, depth_image, is_depth
+from riseg_drake.recording.bag_messages import BagMessages, pose_numbers
 from riseg_drake.recording.bag_topics import (
     ROLES,
     CameraInfo,
@@ -24,7 +26,6 @@ from riseg_drake.recording.bag_topics import (
 )
 from riseg_drake.recording.bag_transforms import TransformTree, stamped_table
 from riseg_drake.recording.layout import (
-    MILLIMETRES,
     LeftOut,
     RecordedFrame,
     RecordingError,
@@ -51,7 +52,6 @@ class BagReader(RecordedSource):
         self.left_out: list[LeftOut] = []
         self.warnings: list[str] = []
         self.joints: StampedTable | None = None
-        self.depth_scale = MILLIMETRES
         self._options = options
         self._poses: StampedTable | None = None
         self._world: str | None = None
@@ -65,10 +65,13 @@ class BagReader(RecordedSource):
             self._color, self._depth = chosen_pair(
                 _images(bag, options.topics), options.topics, self._transforms.connected, str(path)
             )
-            self._registration = self._registered(self._color, self._depth)
+            self.registration = self._registered(self._color, self._depth)
+            """How its images become those of one pinhole."""
+            self._unit = bag.depth_unit(self._depth.name)
+            self.depth_scale = float(1 / Decimal(str(self._unit)))
             self._read_stamps(bag)
             self._find_joints(bag)
-        self.intrinsics = self._registration.intrinsics
+        self.intrinsics = self.registration.intrinsics
         self.warnings += [f"{path}: {odd}" for odd in unlikely_camera(self.intrinsics)]
         self.camera_poses = self._find_poses(bag)
         self._frames = self._associated()
@@ -96,6 +99,19 @@ class BagReader(RecordedSource):
         if frames == 0:
             raise RecordingError(f"{self.path}: no frame can be read: {first_damage}")
 
+    def frames_at(self, numbers: Sequence[int]) -> dict[int, RecordedFrame | None]:
+        """Some frames by their numbers, from 0, in one pass; None for those that are damaged."""
+        wanted, found = set(numbers), {}
+        for number, images in enumerate(self._messages()):
+            if number in wanted:
+                try:
+                    found[number] = self._frame(number + 1, *images)
+                except DamagedImageError:
+                    found[number] = None
+                if len(found) == len(wanted):
+                    break
+        return found
+
     def leave_out(self, frame: RecordedFrame, why: str) -> None:
         """Note that a frame was passed over."""
         self._leave_out(frame.line, why)
@@ -107,10 +123,10 @@ class BagReader(RecordedSource):
         seconds, limit = time / 10**9, self._options.stamp_limit
         name = f"{self._color.name} at {seconds!r} s"
         image = color_image(color, name)
-        metres = depth_image(depth, f"{self._depth.name} at {seconds!r} s")
+        metres = depth_image(depth, f"{self._depth.name} at {seconds!r} s", self._unit)
         for found, right in (
-            (image.shape[:2], self._registration.color.intrinsics.shape),
-            (metres.shape, self._registration.depth_shape),
+            (image.shape[:2], self.registration.color.intrinsics.shape),
+            (metres.shape, self.registration.depth_shape),
         ):
             if found != right:
                 raise DamagedImageError(
@@ -118,8 +134,8 @@ class BagReader(RecordedSource):
                 )
         return RecordedFrame(
             time=seconds,
-            color=self._registration.registered_color(image),
-            depth=self._registration.registered_depth(metres),
+            color=self.registration.registered_color(image),
+            depth=self.registration.registered_depth(metres),
             X_WC=self._pose_at(seconds),
             position=None if self.joints is None else row_between(self.joints, seconds, limit),
             name=f"{number - 1:06d}.png",
@@ -134,7 +150,7 @@ class BagReader(RecordedSource):
         size = 0
         with opened_bag(self.path) as bag:
             for topic, recorded, raw in bag.messages(due):
-                time = bag.header_time(raw, recorded)
+                time = bag.stamp(topic, raw, recorded)
                 if due[topic][time] == 0 or time in waiting[topic]:
                     continue
                 waiting[topic][time] = raw
@@ -161,27 +177,28 @@ class BagReader(RecordedSource):
         self.warnings.append(f"depth of {depth.name} is not aligned to colour; the program aligns it")
         return Registration(color.lens, depth.lens, self._transforms.X_AB(C, D, 0.0, 1.0))
 
-    def _read_stamps(self, bag: BagFile) -> None:
+    def _read_stamps(self, bag: BagMessages) -> None:
         """The first pass: stamps of images, and all rows of poses and joint angles."""
         self._stamps: dict[str, list[int]] = {self._color.name: [], self._depth.name: []}
         pose, joints = self._options.topics.get("pose"), _joint_topic(bag, self._options.topics)
         times, rows = array("d"), array("d")
         self._states: list[tuple[float, tuple[str, ...], list[float]]] = []
         for topic, recorded, raw in bag.messages({*self._stamps, *filter(None, (pose, joints))}):
-            time = bag.header_time(raw, recorded)
+            time = bag.stamp(topic, raw, recorded)
             if topic in self._stamps:
                 self._stamps[topic].append(time)
                 continue
             message = bag.message(topic, raw)
             if topic == pose:
                 times.append(time / 10**9)
-                rows.extend(_pose_numbers(getattr(message.pose, "pose", message.pose)))
+                pose_of = getattr(message.pose, "pose", message.pose)
+                rows.extend(pose_numbers(pose_of.position, pose_of.orientation))
             else:
                 self._states.append((time / 10**9, tuple(message.name), list(message.position)))
         if pose is not None:
             self._poses = stamped_table(pose, times, rows)
 
-    def _find_joints(self, bag: BagFile) -> None:
+    def _find_joints(self, bag: BagMessages) -> None:
         """The angles of the joints that most messages name, where it is known what they belong to."""
         if not self._states:
             return
@@ -197,7 +214,7 @@ class BagReader(RecordedSource):
         times, values = array("d", [t for t, _ in rows]), array("d", [v for _, q in rows for v in q])
         self.joints = stamped_table(topic, times, values, list(names))
 
-    def _find_poses(self, bag: BagFile) -> str | None:
+    def _find_poses(self, bag: BagMessages) -> str | None:
         """Where the camera's poses come from, in words; None if it stands still."""
         if self._poses is not None:
             return self._options.topics["pose"]
@@ -256,7 +273,7 @@ class BagReader(RecordedSource):
         return frames
 
 
-def _images(bag: BagFile, asked: Any) -> list[ImageTopic]:
+def _images(bag: BagMessages, asked: Any) -> list[ImageTopic]:
     """All topics of colour and depth images, with their cameras."""
     cameras: dict[str, CameraInfo | None] = {}
     for topic, kind in bag.types.items():
@@ -280,24 +297,13 @@ def _images(bag: BagFile, asked: Any) -> list[ImageTopic]:
     return images
 
 
-def _transforms(bag: BagFile) -> TransformTree:
+def _transforms(bag: BagMessages) -> TransformTree:
     tree = TransformTree()
-    topics = [topic for topic, kind in bag.types.items() if kind in ("TFMessage", "tfMessage")]
-    for topic, _, raw in bag.messages(topics):
-        for each in bag.message(topic, raw).transforms:
-            time = each.header.stamp.sec + each.header.stamp.nanosec / 10**9
-            parent, child = str(each.header.frame_id).lstrip("/"), str(each.child_frame_id).lstrip("/")
-            p, q = each.transform.translation, each.transform.rotation
-            numbers = [float(v) for v in (p.x, p.y, p.z, q.x, q.y, q.z, q.w)]
-            tree.add(parent, child, time, numbers, static=topic.endswith("tf_static"))
+    for each in bag.transforms():
+        tree.add(each.parent, each.child, each.time, each.pose, static=each.static)
     return tree
 
 
-def _joint_topic(bag: BagFile, asked: Any) -> str | None:
+def _joint_topic(bag: BagMessages, asked: Any) -> str | None:
     topics = [topic for topic, kind in sorted(bag.types.items()) if kind == "JointState"]
     return asked.get("joints") or (topics[0] if topics else None)
-
-
-def _pose_numbers(pose: Any) -> list[float]:
-    p, q = pose.position, pose.orientation
-    return [float(v) for v in (p.x, p.y, p.z, q.x, q.y, q.z, q.w)]

@@ -74,6 +74,8 @@ def camera_info(message: Any) -> CameraInfo | None:
     rectified = _intrinsics(size, P[0], P[5], P[2], P[6]) if P is not None and P[0] else raw
     model = str(message.distortion_model).lower()
     fisheye = model in ("equidistant", "fisheye", "kannala_brandt4")
+    if model == "kannala brandt4":  # a RealSense file's word, with a number that is not used
+        fisheye, D = True, D[:4]
     distortion = tuple(float(k) for k in D) if any(D) else ()
     return CameraInfo(
         str(message.header.frame_id).lstrip("/"), lens_of(raw, distortion, fisheye=fisheye), Lens(rectified)

@@ -33,6 +33,7 @@ from riseg_drake.stations.arm_view import add_arm_view
 from riseg_drake.stations.lcm_channels import LcmConfig
 from riseg_drake.stations.lcm_images import ImageError, LcmImages, decode_images
 from riseg_drake.stations.lcm_reception import Reception
+from riseg_drake.stations.realsense import CameraDriverConfig
 from riseg_drake.stations.wrist_camera import check_camera
 
 LONGEST_EXPOSURE = 1.0
@@ -67,6 +68,8 @@ class HardwareCameraConfig:
     """Nearest depth that is believed, m."""
     depth_max: float = field(default=3.0, metadata={"least": 0.0, "most": 20.0})
     """Farthest depth that is believed, m."""
+    driver: CameraDriverConfig = field(default_factory=CameraDriverConfig)
+    """What `riseg drive-camera` sets on it."""
 
     def check(self) -> None:
         """Raise ValueError for a camera that cannot be."""

@@ -100,6 +100,14 @@ EXECUTED: dict[str, tuple[Callable[[list[str]], list[str] | None], str]] = {
         "films a run; tests/app/show/test_pictures_command.py has a small one",
     ),
     "hardware": (lambda words: None, "needs the drivers; tests/app/test_emulate.py runs it on emulated ones"),
+    "drive-camera": (
+        lambda words: None,
+        "needs a camera; tests/app/hardware/test_drive_camera.py plays a file",
+    ),
+    "calibrate": (
+        lambda words: words if "--draw" in words else None,
+        "needs views of a board; tests/app/hardware/test_calibrate.py renders some",
+    ),
     "hand-eye": (
         lambda words: None,
         "needs the drivers; tests/segmentation/test_hand_eye.py has its arithmetic",

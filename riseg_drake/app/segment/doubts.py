@@ -4,10 +4,11 @@ from pathlib import Path
 
 from riseg_drake.app.segment.recorded_view import FIXED, RecordedView
 from riseg_drake.geometry.rgbd import Frame
-from riseg_drake.plausibility.check import doubts
+from riseg_drake.plausibility.check import doubts, looked_at
 from riseg_drake.plausibility.limits import PlausibilityLimits
 from riseg_drake.plausibility.lists import doubts_about_names, doubts_about_rate
 from riseg_drake.recording import layout
+from riseg_drake.recording.bag_reader import BagReader
 from riseg_drake.recording.reader import RecordingReader
 from riseg_drake.recording.source import RecordedSource
 
@@ -18,16 +19,20 @@ _MOST = 1000
 
 
 def recording_doubts(reader: RecordedSource, view: RecordedView) -> list[str]:
-    """What of a recording cannot be, or can hardly be, a line each; of a bag, whose frames come one after the
-    other, how often they come."""
+    """What of a recording cannot be, or can hardly be, a line each."""
     limits = PlausibilityLimits()
     count = len(reader)
-    if not isinstance(reader, RecordingReader):
-        return doubts_about_rate(reader.rate, count, limits)
+    # The frames of a bag come one after the other: those that are looked at are read in one pass.
+    kept = reader.frames_at(looked_at(count)) if isinstance(reader, BagReader) else {}
 
     def read(number: int) -> Frame | None:
-        recorded = reader.frame(number)
+        recorded = reader.frame(number) if isinstance(reader, RecordingReader) else kept.get(number)
         return None if recorded is None else view.frame(recorded)
+
+    poses = None if view.camera_poses == FIXED else view.camera_poses
+    rate = doubts_about_rate(reader.rate, count, limits)
+    if not isinstance(reader, RecordingReader):
+        return [*rate, *doubts(read, count, reader.depth_scale, poses, limits)]
 
     beside = {
         folder: reader.images_beside(folder)
@@ -35,9 +40,8 @@ def recording_doubts(reader: RecordedSource, view: RecordedView) -> list[str]:
         if reader.holds_images(folder)
     }
     names = doubts_about_names(count, beside, _unused(reader), Path(reader.names[0][0]).name)
-    poses = None if view.camera_poses == FIXED else view.camera_poses
     return [
-        *doubts_about_rate(reader.rate, count, limits),
+        *rate,
         *names,
         *doubts(read, count, reader.depth_scale, poses, limits),
     ]

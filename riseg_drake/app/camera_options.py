@@ -1,0 +1,49 @@
+"""The options of the commands that are about the camera alone."""
+
+import argparse
+from pathlib import Path
+
+from riseg_drake.app.options import add_scenario
+
+
+def add_drive_camera_options(command: argparse.ArgumentParser) -> None:
+    """Which camera, by the scenario, or which file."""
+    add_scenario(command, built_in="the built-in hardware.yaml")
+    command.add_argument(
+        "--file", type=Path, metavar="FILE", help="play this .bag or .db3 of a RealSense camera instead, once"
+    )
+
+
+def add_calibrate_options(command: argparse.ArgumentParser) -> None:
+    """Which views of which board, and what for."""
+    command.add_argument(
+        "folder",
+        type=Path,
+        nargs="?",
+        metavar="FOLDER",
+        help="rgb.txt and its images, camera.json, joints.csv or tip.txt (poses X_WE); with --live a new one",
+    )
+    command.add_argument(
+        "--scenario", type=Path, metavar="FILE", help="a YAML file (the built-in hardware.yaml)"
+    )
+    command.add_argument(
+        "--board",
+        nargs=4,
+        metavar=("KIND", "COLUMNSxROWS", "MM", "MM"),
+        help="charuco, with the sides of squares and of markers (charuco 7x5 40 30), or apriltag, with that of "
+        "tags and the room between them",
+    )
+    command.add_argument(
+        "--mount",
+        choices=("wrist", "world"),
+        help="camera on the wrist over a board that lies still (default), or in the world with a carried board",
+    )
+    command.add_argument(
+        "--live", action="store_true", help="take the views now, through the drivers; the arm is moved by hand"
+    )
+    command.add_argument(
+        "--output", type=Path, metavar="FILE", help="also write the scenario's lines to this file"
+    )
+    command.add_argument(
+        "--draw", type=Path, metavar="FILE", help="only draw the board, as a PNG to be printed"
+    )
