@@ -133,6 +133,13 @@ class CommandLimiter:
         """Whether the last wish led out of the joints' ranges; the arm stays within, or comes to a stop."""
         self._stop, self._stopped_for, self._is_calm = self._stop_from_here(self._braking), 0.0, False
 
+    def go_on_from(self, position: NDArray, velocity: NDArray, acceleration: NDArray) -> None:
+        """Be in motion, each [7], where somebody else has taken the trajectory meanwhile."""
+        limit = self._acceleration_limit
+        self.position, self.velocity = np.array(position, np.float64), np.array(velocity, np.float64)
+        self.acceleration = np.clip(acceleration, -limit, limit)
+        self._stop, self._stopped_for, self._is_calm = self._stop_from_here(self._braking), 0.0, False
+
     @property
     def at_rest(self) -> bool:
         """Whether nothing moves, to well below what a position can be told."""
