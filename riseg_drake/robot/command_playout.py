@@ -94,7 +94,7 @@ class CommandPlayout:
         return Target(self._positions[k] + since * (self._values[k] + velocity) / 2, velocity, slope)
 
     def _cubic(self, k: int, time: float) -> Target:
-        T = self._stamps[k + 1] - self._stamps[k]
+        T = float(self._stamps[k + 1] - self._stamps[k])
         s = (time - self._stamps[k]) / T
         q_0, v_0, v_1 = self._values[k], T * self._velocity(k), T * self._velocity(k + 1)
         chord = self._values[k + 1] - q_0
@@ -114,7 +114,7 @@ class CommandPlayout:
             before, after = (0, 1) if k == 0 else (last - 1, last)
             gap = self._stamps[after] - self._stamps[before]
             return np.zeros(7) if gap > _GAP else (self._values[after] - self._values[before]) / gap
-        before, after = self._stamps[k] - self._stamps[k - 1], self._stamps[k + 1] - self._stamps[k]
-        earlier = (self._values[k] - self._values[k - 1]) / before
-        later = (self._values[k + 1] - self._values[k]) / after
-        return (after * earlier + before * later) / (before + after)
+        since, until = self._stamps[k] - self._stamps[k - 1], self._stamps[k + 1] - self._stamps[k]
+        earlier = (self._values[k] - self._values[k - 1]) / since
+        later = (self._values[k + 1] - self._values[k]) / until
+        return (until * earlier + since * later) / (since + until)

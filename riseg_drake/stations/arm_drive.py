@@ -25,6 +25,8 @@ from riseg_drake.stations.rate_limiter import TICK
 
 EXPIRY = 0.1
 """A command is too old, or of a time to come, by more than this, s; drake-franka-driver's own default."""
+WORD_AGE = 2.0
+"""Oldest word of the operator that counts, s; it is repeated, with the stamp of when it was said."""
 LARGEST_GAP = 0.1
 """Commands of joint angles are refused this far from where the arm is told to be, rad."""
 HELD = lcmt_panda_status.kOther
@@ -57,7 +59,7 @@ class RobotReading:
     torque: NDArray[np.float64]
     torque_external: NDArray[np.float64]
     position_desired: NDArray[np.float64]
-    """What the robot makes of the last command, rad [7], with its derivatives, rad/s and rad/s^2, and torque."""
+    """What the robot makes of the last command, rad [7]; its derivatives, rad/s, rad/s^2, and torque, N m."""
     velocity_desired: NDArray[np.float64]
     acceleration_desired: NDArray[np.float64]
     torque_desired: NDArray[np.float64]
@@ -101,7 +103,8 @@ class ArmDrive:
     """See above; `step` once a cycle of the robot. `state` is what it does, `reason` why, in detail."""
 
     def __init__(self, is_velocity: bool, robot: RobotLimits):
-        self._is_velocity = is_velocity
+        """`is_velocity`: commands are velocities, and not joint angles."""
+        self.is_velocity = is_velocity
         self._robot = robot
         self._playout = CommandPlayout(is_velocity)
         self._limiter: CommandLimiter | None = None  # None: the robot takes no commands
@@ -150,7 +153,8 @@ class ArmDrive:
         said: list[str] = []
         recover = False
         for word in words:
-            if self.state in LATCHED and self._since < 1e-6 * word.utime and self._is_fresh(word, wall):
+            said_at = 1e-6 * word.utime
+            if self.state in LATCHED and max(self._since, wall - WORD_AGE) < said_at < wall + EXPIRY:
                 said += self._go_on()
                 recover = self._limiter is None
         for command in commands:
@@ -193,11 +197,11 @@ class ArmDrive:
             return []
         if not self._is_fresh(command, wall):
             return []
-        flaw = _flaw(command, self._is_velocity)
+        flaw = _flaw(command, self.is_velocity)
         if flaw:
             return self._latch(Drive.REFUSED, wall, flaw)
-        values = np.array(command.joint_velocity if self._is_velocity else command.joint_position, np.float64)
-        off = 0.0 if self._is_velocity else float(np.abs(values - self._limiter.position).max())
+        values = np.array(command.joint_velocity if self.is_velocity else command.joint_position, np.float64)
+        off = 0.0 if self.is_velocity else float(np.abs(values - self._limiter.position).max())
         if off > LARGEST_GAP:
             return self._latch(Drive.REFUSED, wall, f"it is {off:.2f} rad from where the arm is")
         self._playout.add(1e-6 * command.utime, values, self._limiter.position)
@@ -229,7 +233,7 @@ class ArmDrive:
         else:
             limiter.follow(target)
         # The mean over the tick: then the robot's own sum of velocities is where this trajectory is.
-        return (limiter.position - before) / TICK if self._is_velocity else limiter.position
+        return (limiter.position - before) / TICK if self.is_velocity else limiter.position
 
     def _status(self, reading: RobotReading) -> lcmt_panda_status:
         assert self._offset is not None

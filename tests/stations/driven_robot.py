@@ -1,4 +1,4 @@
-"""A robot that does what it is told, and judges it as libfranka's robot does: by differences of the commands."""
+"""A robot that does what it is told, and judges that by differences of the commands, as the real one does."""
 
 import numpy as np
 from drake import lcmt_panda_command

@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from tests.stations.driven_robot import ROBOT, WALL, DrivenRobot, command, word
 
 from riseg_drake.robot.command_playout import DELAY
 from riseg_drake.robot.kinematics import READY
@@ -8,6 +7,7 @@ from riseg_drake.robot.limits import FR3_LIMITS, PANDA_LIMITS
 from riseg_drake.robot.supervisor import MOVE, REFLEX, USER_STOPPED
 from riseg_drake.stations.arm_drive import EXPIRY, HELD, LIMITS, Drive
 from riseg_drake.stations.rate_limiter import TICK
+from tests.stations.driven_robot import ROBOT, WALL, DrivenRobot, command, word
 
 MODES = ("position", "velocity")
 STOP = round(1e3 * (EXPIRY + LIMITS.longest_stop(FR3_LIMITS)))  # ticks
@@ -49,7 +49,7 @@ def test_commands_that_are_up_to_15_ms_late_and_out_of_order_change_the_motion_b
 @pytest.mark.parametrize("mode", MODES)
 def test_where_commands_end_in_motion_the_arm_brakes_within_limits_holds_says_so_and_wants_a_word(mode):
     robot = DrivenRobot(mode).swing(0.6)
-    assert np.abs(robot.v).max() > 0.1
+    assert np.abs(robot.v).max() > 0.05
     robot.wait(STOP)
     assert robot.drive.state is Drive.EXPIRED
     assert robot.status.robot_mode == HELD
@@ -71,7 +71,7 @@ def test_where_commands_end_in_motion_the_arm_brakes_within_limits_holds_says_so
 def test_commands_that_end_at_rest_may_begin_again_without_a_word(mode):
     robot = DrivenRobot(mode)
     for _ in range(10):
-        robot.tick(command(mode, READY if mode == "position" else np.zeros(7), robot.now)).status
+        robot.tick(command(mode, READY if mode == "position" else np.zeros(7), robot.now))
         robot.wait(4)
     robot.wait(2 * STOP)
     assert (robot.drive.state, robot.said, robot.status.robot_mode) == (Drive.WAITING, [], MOVE)
