@@ -41,11 +41,18 @@ def franka_python():
 class FrankaServer:
     """franka_server.py in a process of its own; as a context."""
 
-    def __init__(self, address, *options):
+    def __init__(self, address, q, *options):
         self.address = address
         self.file = Path(tempfile.mkdtemp()) / "rows.npy"
         self.process = subprocess.Popen(
-            [franka_python(), str(SERVER), str(self.file), address, *options],
+            [
+                franka_python(),
+                str(SERVER),
+                str(self.file),
+                address,
+                ",".join(map(repr, map(float, q))),
+                *options,
+            ],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -123,8 +130,6 @@ class Rig:
             self.link, self.network, self.config, self.drive, self.said.append, lambda: self.now
         )
         self.kinematics = kinematics
-        self.words = self.states = None
-        self.modes = []
 
     @property
     def now(self):
@@ -134,6 +139,10 @@ class Rig:
         self.last = self.ticks + ticks
         self.process.run()
         return self
+
+    def publish(self, values):
+        """A command that nobody has looked at."""
+        self.network.Publish("PANDA_COMMAND", command_message(values, self.mode, self.now).encode())
 
     def _turn(self):
         self.ticks += 1

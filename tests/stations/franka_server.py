@@ -4,7 +4,7 @@ Each cycle waits for the client's answer to the one before, however long that ta
 wall time: the robot's clock goes by what was answered. Words on standard input make it fail; what it saw is
 written to the file of the first argument when it ends: one row a cycle, robot_mode, q_d [7], q [7].
 
-franka_server.py FILE.npy ADDRESS [wall]     with `wall` it keeps to real time instead
+franka_server.py FILE.npy ADDRESS q1,...,q7 [wall]     from where; with `wall` it keeps to real time instead
 """
 
 import os
@@ -55,13 +55,12 @@ os.environ["FR3_MJCF"] = model.name
 import franka_sim.server.state_stream as state_stream  # noqa: E402
 import numpy as np  # noqa: E402
 from franka_sim import FrankaSimServer  # noqa: E402
-from franka_sim.franka_protocol import Command, MessageHeader  # noqa: E402
+from franka_sim.franka_protocol import Command, ConnectStatus, MessageHeader  # noqa: E402
 from franka_sim.motion_limits import JOINT_VELOCITY_VIOLATION_INDEX  # noqa: E402
 from franka_sim.limits.checker import Violation  # noqa: E402
 
 
-USER_STOPPED = 5
-READY = np.array([0.0, -0.1, 0.0, -2.4, 0.0, 2.3, 0.0])
+USER_STOPPED, SPOKEN = 5, 10
 PATIENCE = 0.8  # s; libfranka itself gives up after one
 
 
@@ -92,6 +91,11 @@ class SteppedServer(FrankaSimServer):
         if self.is_pressed:
             self.robot_state.state["robot_mode"] = USER_STOPPED
         return 0.0
+
+    def send_response(self, client_socket, command, command_id, status, version) -> None:
+        """Refuses the client's libfranka where the robot is of another version."""
+        refused = ConnectStatus.kIncompatibleLibraryVersion if version != SPOKEN else status
+        super().send_response(client_socket, command, command_id, refused, version)
 
     def reflex(self, index: int) -> None:
         """The robot stops by itself."""
@@ -143,7 +147,8 @@ def obey(server: SteppedServer) -> None:
     os._exit(0)
 
 
-file, address = sys.argv[1:3]
+file, address, posture = sys.argv[1:4]
+start = np.array([float(q) for q in posture.split(",")])
 rows: list = []
 server = SteppedServer(
     host=address,
@@ -155,8 +160,8 @@ server = SteppedServer(
 )
 server.is_stepped = "wall" not in sys.argv
 server.physics_sim.initialize_simulation()
-server.physics_sim.data.qpos[server.physics_sim.arm_qpos_adr] = READY
-server.physics_sim.latest_joint_positions = READY.copy()
+server.physics_sim.data.qpos[server.physics_sim.arm_qpos_adr] = start
+server.physics_sim.latest_joint_positions = start.copy()
 server.physics_sim.step()
 if server.is_stepped:
     clock = types.SimpleNamespace(
