@@ -126,6 +126,22 @@ def command_line() -> argparse.ArgumentParser:
     add_overwrite(hand_eye, "check")
     hand_eye.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
 
+    drive_arm = _add(
+        subparsers,
+        "drive-arm",
+        commands.drive_arm,
+        "Drive a Franka Research 3 or a Panda: commands from LCM to libfranka, the robot's state back.\n"
+        "Runs until Ctrl-C; after a stop it waits for the operator's word in `riseg hardware`.",
+    )
+    add_scenario(drive_arm, built_in=_HARDWARE)
+    drive_arm.add_argument("--ip", required=True, metavar="A", help="address of the robot's control box")
+    drive_arm.add_argument(
+        "--mode", choices=("velocity", "position"), help="what is commanded (the scenario's: velocity)"
+    )
+    drive_arm.add_argument(
+        "--check", action="store_true", help="only read for 5 s, move nothing, and say what would not do"
+    )
+
     emulate = _add(
         subparsers,
         "emulate",

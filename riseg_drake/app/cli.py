@@ -83,6 +83,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.recording.layout import RecordingError
     from riseg_drake.robot.own_robot import OwnRobotError
     from riseg_drake.stations.command_process import CommandError
+    from riseg_drake.stations.franka_link import LinkError
     from riseg_drake.stations.lcm_channels import LcmError
     from riseg_drake.stations.lcm_images import ImageError
     from riseg_drake.stations.misbehaviour import WordError
@@ -104,6 +105,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
         EvaluationError,
         PoolError,
         LcmError,
+        LinkError,
         ImageError,
         CommandError,
         HardwareError,

@@ -289,7 +289,7 @@ class CommandLimiter:
         return bool(((lowest <= velocity) & (velocity <= highest)).all())
 
     def _is_slow_at_both_ends(self, stop: Trajectory) -> bool:
-        """Whether no joint gets faster than it may be where the stop begins and ends: in between it may be faster.
+        """Whether no joint gets faster than it may be where the stop begins and ends; between it may be faster.
 
         That settles most stops, which are slow and far from the ends of the ranges, at a tenth of the effort.
         """

@@ -32,7 +32,7 @@ LONGEST_DEAF = 0.3
 which the largest `status_gap` leaves as much."""
 
 RECOVERS_WITHIN = 5.0
-"""A robot that takes no commands has so long to recover after the operator's word, s; then it is asked again."""
+"""A robot that takes no commands has so long to recover after the operator's word, s; then it counts."""
 HAS_RECOVERED = 0.1
 """... and has, once it takes commands for so long, s."""
 
@@ -82,7 +82,7 @@ class CommandSession:
         self._word_waits = False
         self._unready = -np.inf  # when the arm last took no commands, s
         self.word_said: float | None = None
-        """When the operator's word came that a robot waits for, to recover, by the clock of stamps, s; else None."""
+        """When a word of the operator came that a robot must recover for first, by the clock of stamps, s."""
         self.failed = ""
         """What went wrong, in one line; empty while nothing has."""
 

@@ -6,12 +6,14 @@ the robot and publishes. Nothing in here decides anything; that is ArmDrive's.
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 from drake import lcmt_drake_signal, lcmt_panda_command
 from numpy.typing import NDArray
 from pydrake.lcm import DrakeLcmInterface
 
+from riseg_drake.robot.supervisor import REFLEX
 from riseg_drake.stations.arm_drive import ArmDrive, Drive, DriveOutput, RobotReading
 from riseg_drake.stations.franka_link import Link, RobotStopped
 from riseg_drake.stations.lcm_channels import LcmConfig
@@ -62,11 +64,16 @@ class DriveProcess:
                 self._watch(self._link.read())
 
     def _begin(self) -> bool:
-        """Whether the robot is ready to take commands; else it waits for the operator's word."""
-        reading = self._link.read()
-        if reading.mode == _IDLE:
-            return True
-        self._say(self._drive.lose(self._wall(), self._reason(reading.mode, "")))
+        """Wait until the robot is ready; that somebody has started the driver is the operator's first word."""
+        while not self._is_ending:
+            reading = self._link.read()
+            if reading.mode == _IDLE:
+                return True
+            self._say(self._drive.lose(self._wall(), self._reason(reading.mode, ", ".join(reading.errors))))
+            self._step(reading)
+            if reading.mode == REFLEX:
+                with suppress(RobotStopped):
+                    self._link.recover()
         return False
 
     def _control(self) -> None:

@@ -41,6 +41,9 @@ class RobotStopped(RuntimeError):  # noqa: N818 - what a robot does, and not alw
 class Link(Protocol):
     """A connection to a robot; nothing moves but in `control`."""
 
+    system: str
+    """Of what version the robot's system is, as far as it says."""
+
     def read(self) -> RobotReading:
         """What the robot tells next. Raises LinkError where it says nothing any more."""
 
@@ -71,6 +74,10 @@ class FrankaLink:
         except Exception as error:
             raise LinkError(why_not_connected(robot, address, str(error))) from None
         self._is_panda = robot == "panda"
+        spoken = (
+            self._robot.server_version() if self._is_panda else 10
+        )  # the only one that pylibfranka connects to
+        self.system = f"its system speaks server version {spoken}, as the libfranka of {PACKAGES[robot]} does"
 
     def configure(self) -> None:
         """Set at what forces the robot stops by itself. Raises RobotStopped."""
@@ -157,7 +164,13 @@ def reading(state: Any) -> RobotReading:
         acceleration_desired=np.array(state.ddq_d, np.float64),
         torque_desired=np.array(state.tau_J_d, np.float64),
         success_rate=state.control_command_success_rate,
+        errors=_names(state.current_errors) if state.robot_mode.name.endswith("Reflex") else (),
     )
+
+
+def _names(errors: Any) -> tuple[str, ...]:
+    """The names of a franka::Errors that are set."""
+    return tuple(name for name in dir(errors) if not name.startswith("_") and getattr(errors, name) is True)
 
 
 def told(error: BaseException | str) -> str:
