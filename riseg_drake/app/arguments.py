@@ -4,7 +4,12 @@ import argparse
 from pathlib import Path
 
 from riseg_drake.app import commands
-from riseg_drake.app.camera_options import add_calibrate_options, add_drive_camera_options
+from riseg_drake.app.driver_options import (
+    HARDWARE,
+    add_calibrate_options,
+    add_drive_arm_options,
+    add_drive_camera_options,
+)
 from riseg_drake.app.export_options import add_export
 from riseg_drake.app.options import (
     add_overwrite,
@@ -17,8 +22,6 @@ from riseg_drake.app.options import (
 )
 from riseg_drake.app.package import package_version
 from riseg_drake.app.parser import Parser
-
-_HARDWARE = "the built-in hardware.yaml"
 
 
 def command_line() -> argparse.ArgumentParser:
@@ -105,7 +108,7 @@ def command_line() -> argparse.ArgumentParser:
         "The same on a real Panda with a RealSense camera, over their drivers on LCM; see docs/hardware.md.\n"
         "The operator confirms every push; --dry-run shows pushes and moves nothing.",
     )
-    add_scenario(hardware, built_in=_HARDWARE)
+    add_scenario(hardware, built_in=HARDWARE)
     hardware.add_argument("--seed", type=seed_number, default=0, metavar="N", help="draws samples (0)")
     hardware.add_argument("--output", type=Path, metavar="DIR", help="output folder (out/SCENARIO_TIME)")
     hardware.add_argument("--record", action="store_true", help="also write every frame to DIR/recording")
@@ -132,7 +135,7 @@ def command_line() -> argparse.ArgumentParser:
         "Move a real arm a little over a scene that stands still, and compare expected with observed flow.\n"
         "Says in pixels how well the camera's pose on the arm is known, and where the table is.",
     )
-    add_scenario(hand_eye, built_in=_HARDWARE)
+    add_scenario(hand_eye, built_in=HARDWARE)
     hand_eye.add_argument("--output", type=Path, metavar="DIR", help="folder for pictures (out/hand_eye)")
     add_overwrite(hand_eye, "check")
     hand_eye.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
@@ -154,6 +157,16 @@ def command_line() -> argparse.ArgumentParser:
             commands.drive_camera,
             "Publish colour and aligned depth of a RealSense camera, or of its file, on LCM until Ctrl-C.\n"
             "Prints the camera's intrinsics as the scenario wants them.",
+        )
+    )
+
+    add_drive_arm_options(
+        _add(
+            subparsers,
+            "drive-arm",
+            commands.drive_arm,
+            "Drive a Franka Research 3 or a Panda: commands from LCM to libfranka, the robot's state back.\n"
+            "Runs until Ctrl-C; after a stop it waits for the operator's word in `riseg hardware`.",
         )
     )
 
@@ -304,7 +317,7 @@ def command_line() -> argparse.ArgumentParser:
         "Say what this machine and this installation can do, each with its remedy where it lacks something.\n"
         "Ends with 1 where something is missing that simulating and segmenting need.",
     )
-    add_scenario(doctor, "a YAML file, for its LCM network and channels", _HARDWARE)
+    add_scenario(doctor, "a YAML file, for its LCM network and channels", HARDWARE)
 
     diagram = _add(
         subparsers,

@@ -84,6 +84,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.robot.camera_calibration import CalibrationError
     from riseg_drake.robot.own_robot import OwnRobotError
     from riseg_drake.stations.command_process import CommandError
+    from riseg_drake.stations.franka_link import LinkError
     from riseg_drake.stations.lcm_channels import LcmError
     from riseg_drake.stations.lcm_images import ImageError
     from riseg_drake.stations.misbehaviour import WordError
@@ -109,6 +110,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
         LcmError,
         RealSenseError,
         CalibrationError,
+        LinkError,
         ImageError,
         CommandError,
         HardwareError,

@@ -62,6 +62,14 @@ def hardware(chosen: argparse.Namespace, console: Console) -> None:
     hardware_command(_request(HardwareRequest, chosen), console)
 
 
+def drive_arm(chosen: argparse.Namespace, console: Console) -> None:
+    """`riseg drive-arm`."""
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    from riseg_drake.app.hardware.drive_arm import DriveRequest, drive_arm_command
+
+    drive_arm_command(_request(DriveRequest, chosen), console)
+
+
 def hand_eye(chosen: argparse.Namespace, console: Console) -> None:
     """`riseg hand-eye`."""
     os.environ.setdefault("OMP_NUM_THREADS", "1")

@@ -28,7 +28,7 @@ from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.robot.supervisor import Cause
 from riseg_drake.robot.tip_geometry import TipGeometry
-from riseg_drake.stations.command_session import CommandSession, StreamReport, command_message
+from riseg_drake.stations.command_session import CommandSession, StreamReport, command_message, word_message
 from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.lcm_channels import LcmConfig, open_lcm
 from riseg_drake.stations.promptness import be_prompt
@@ -212,6 +212,8 @@ def stream_commands(
                 network.Publish(lcm.command_channel, message.encode())
                 session.was_sent(command)
                 sent.append(time.monotonic())
+            if session.word_said is not None and rounds % REPORT_EVERY == 0:
+                network.Publish(lcm.recovery_channel, word_message(session.word_said).encode())
         except Exception as error:  # of the network; a session sees to its own
             session.fail(error)
             failures += 1

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from riseg_drake.robot.command_stream import VELOCITY, ArmStatus, CommandStream
 from riseg_drake.robot.paced_commands import PacedCommands, StampedCommand
-from riseg_drake.robot.supervisor import Cause, Mode, SafetyState
+from riseg_drake.robot.supervisor import MOVE, Cause, Mode, SafetyState
 from riseg_drake.stations.arm_messages import PictureDoor, StatusDoor
 
 FINAL_COMMANDS = 20
@@ -30,6 +30,11 @@ DEAF = 0.02
 LONGEST_DEAF = 0.3
 """Where nobody has listened for longer, a driver may have been started anew, s: that takes 0.5 s and more, of
 which the largest `status_gap` leaves as much."""
+
+RECOVERS_WITHIN = 5.0
+"""A robot that takes no commands has so long to recover after the operator's word, s; then it counts."""
+HAS_RECOVERED = 0.1
+"""... and has, once it takes commands for so long, s."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +79,10 @@ class CommandSession:
         self._deaf = self._was_deaf = 0.0  # s, since the last status, and between the one before and that
         self._final = 0
         self._refused = ""
+        self._word_waits = False
+        self._unready = -np.inf  # when the arm last took no commands, s
+        self.word_said: float | None = None
+        """When a word of the operator came that a robot must recover for first, by the clock of stamps, s."""
         self.failed = ""
         """What went wrong, in one line; empty while nothing has."""
 
@@ -110,7 +119,7 @@ class CommandSession:
                 case "contact":
                     self._stream.expect_contact(*values)
                 case "release":
-                    self._stream.release()
+                    self._word_waits = True
                 case "abandon":
                     self._stream.abandon_path()
                 case "begin":
@@ -137,6 +146,7 @@ class CommandSession:
         if not self.failed:
             try:
                 self._listen(steady, steady - wall)
+                self._hand_on_word(steady, wall)
                 command = self._paced.next(steady, wall, self._status, self._image_time)
             except Exception as error:  # whatever it is: an arm in motion must come to rest
                 self.fail(error)
@@ -200,6 +210,19 @@ class CommandSession:
             if contradicted is not self._status.contradicted:
                 self._status = replace(self._status, contradicted=contradicted)
 
+    def _hand_on_word(self, now: float, wall: float) -> None:
+        """The operator's word holds once the arm takes commands: after a stop of its own it recovers by it first."""
+        if self._status is not None and self._status.robot_mode != MOVE:
+            self._unready = now
+        if not self._word_waits:
+            return
+        is_ready = now - self._unready > HAS_RECOVERED
+        if self.word_said is None and not is_ready:
+            self.word_said = wall
+        if is_ready or (self.word_said is not None and wall - self.word_said > RECOVERS_WITHIN):
+            self._word_waits, self.word_said = False, None
+            self._stream.release()
+
     def _gap_before(self, status: ArmStatus) -> float:
         """How long the arm said nothing before a status, s, as far as somebody listened.
 
@@ -212,6 +235,13 @@ class CommandSession:
             return 0.0
         gap = status.time - self._status.time
         return gap - deaf if deaf <= LONGEST_DEAF else gap
+
+
+def word_message(said: float) -> lcmt_panda_command:
+    """The operator's word for the arm's driver, stamped with when it was said, s; it commands nothing."""
+    message = lcmt_panda_command()
+    message.utime = int(said * 1e6)
+    return message
 
 
 def command_message(command: NDArray, mode: str, stamp: float) -> lcmt_panda_command:

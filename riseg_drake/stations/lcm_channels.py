@@ -36,6 +36,16 @@ class LcmConfig:
             raise ValueError(f"command_channel is {said!r}, as status_channel is; expected another")
 
     @property
+    def recovery_channel(self) -> str:
+        """Where `riseg hardware` tells `riseg drive-arm` the operator's word that a stopped arm may move again."""
+        return f"{self.command_channel}_RECOVERY"
+
+    @property
+    def errors_channel(self) -> str:
+        """Where `riseg drive-arm` says by name why the arm does not move, for which a status has no field."""
+        return f"{self.status_channel}_ERRORS"
+
+    @property
     def image_channel(self) -> str:
         """Where the camera's driver publishes."""
         return f"DRAKE_RGBD_CAMERA_IMAGES_{self.camera_serial}"

@@ -1,14 +1,28 @@
-"""The options of the commands that are about the camera alone."""
+"""The options of the drivers, and of the camera's calibration."""
 
 import argparse
 from pathlib import Path
 
 from riseg_drake.app.options import add_scenario
 
+HARDWARE = "the built-in hardware.yaml"
+
+
+def add_drive_arm_options(command: argparse.ArgumentParser) -> None:
+    """Which robot, and whether it is only looked at."""
+    add_scenario(command, built_in=HARDWARE)
+    command.add_argument("--ip", required=True, metavar="A", help="address of the robot's control box")
+    command.add_argument(
+        "--mode", choices=("velocity", "position"), help="what is commanded (the scenario's: velocity)"
+    )
+    command.add_argument(
+        "--check", action="store_true", help="only read for 5 s, move nothing, and say what would not do"
+    )
+
 
 def add_drive_camera_options(command: argparse.ArgumentParser) -> None:
     """Which camera, by the scenario, or which file."""
-    add_scenario(command, built_in="the built-in hardware.yaml")
+    add_scenario(command, built_in=HARDWARE)
     command.add_argument(
         "--file", type=Path, metavar="FILE", help="play this .bag or .db3 of a RealSense camera instead, once"
     )
