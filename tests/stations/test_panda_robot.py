@@ -16,7 +16,8 @@ def robot():
 
 
 def test_it_begins_idle_and_at_rest_where_it_is_put(robot):
-    assert robot.mode == IDLE and robot.reflex_reason == ""
+    assert robot.mode == IDLE
+    assert robot.reflex_reason == ""
     np.testing.assert_array_equal(robot.q_d, READY)
     np.testing.assert_array_equal([robot.v_d, robot.a_d], np.zeros((2, 7)))
 
@@ -85,7 +86,7 @@ def test_a_joint_that_leaves_its_range_is_a_reflex_of_that_tick(robot, side):
 
 
 def test_the_hand_leads_at_its_speed_slows_down_and_lets_go_where_it_wanted(robot):
-    goal = np.array(READY) + [0.2, 0, 0, -0.1, 0, 0.02, 0]
+    goal = np.add(READY, [0.2, 0, 0, -0.1, 0, 0.02, 0])
     robot.guide(goal)
     assert robot.mode == GUIDING
     fastest, ticks = np.zeros(7), 0

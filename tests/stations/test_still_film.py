@@ -45,8 +45,10 @@ def test_over_many_films_the_camera_stands_within_its_angles_on_either_side_and_
     x, y, z = np.transpose(eyes) / 0.55
     elevation = np.degrees(np.arcsin(z))
     azimuth = np.degrees(np.arctan2(np.abs(y), x))
-    assert np.all((elevation > 40) & (elevation < 80)) and np.ptp(elevation) > 39
-    assert np.all((azimuth > 90) & (azimuth < 125)) and np.ptp(azimuth) > 34
+    assert np.all((elevation > 40) & (elevation < 80))
+    assert np.ptp(elevation) > 39
+    assert np.all((azimuth > 90) & (azimuth < 125))
+    assert np.ptp(azimuth) > 34
     assert 150 < np.count_nonzero(y > 0) < 250
 
 
@@ -56,7 +58,8 @@ def test_the_hand_sways_by_less_than_it_may_along_each_axis_and_comes_near_it():
         for s in range(12)
     ]
     most = np.max(swayed, axis=(0, 1))
-    assert np.all(most <= 0.04) and np.all(most > 0.032)
+    assert np.all(most <= 0.04)
+    assert np.all(most > 0.032)
 
 
 def test_the_hand_misses_the_middle_by_less_than_it_may():
@@ -68,7 +71,8 @@ def test_the_hand_misses_the_middle_by_less_than_it_may():
         for seed in range(12)
     ]
     most = np.abs(turned).max(axis=(0, 1))
-    assert np.all(most <= 0.02 + 1e-9) and np.all(most > 0.015)
+    assert np.all(most <= 0.02 + 1e-9)
+    assert np.all(most > 0.015)
 
 
 def test_the_hand_sways_in_seconds_whatever_the_cameras_rate():
