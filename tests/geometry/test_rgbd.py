@@ -71,3 +71,11 @@ def test_a_copy_of_what_nobody_changes_is_itself():
     frame = frame_of(100 + U)
     assert deepcopy([frame])[0] is frame
     assert replace(frame, time=1.0) is not frame
+
+
+def test_before_the_first_image_there_is_a_frame_of_no_pixels_older_than_any():
+    assert NO_FRAME.sequence == -1  # frames count from 0
+    assert NO_FRAME.time == -np.inf
+    assert NO_FRAME.color.shape == (0, 0, 3)
+    assert NO_FRAME.depth.shape == NO_FRAME.robot.shape == NO_FRAME.intrinsics.shape == (0, 0)
+    np.testing.assert_array_equal(NO_FRAME.X_WC, np.eye(4))

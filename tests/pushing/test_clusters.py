@@ -85,3 +85,23 @@ def test_piece_with_a_nook_that_nothing_divides_is_at_least_two_clusters(drawn):
         pytest.fail("the drawing has a neck; it should not")
     assert concavity(table.objects, table.cell) > ClustersParameters().concavity
     assert len(first_clusters(table)) >= 2
+
+
+@pytest.mark.parametrize(("bridge", "pieces"), [(0.004, 2), (0.009, 1)])
+def test_what_is_smaller_than_a_part_is_cut_off_only_at_a_neck_of_less_than_6_mm(drawn, bridge, pieces):
+    # 2.5 cm^2, held by a bridge to a box of 25 cm^2: a limb, unless there is next to nothing between them.
+    drawn.box(0.5, 0.0, 0.05, 0.05).box(0.54, 0.0, 0.016, 0.016).box(0.528, 0.0, 0.01, bridge)
+    table = drawn.map()
+    assert len(take_apart(table.objects, table, ClustersParameters())) == pieces
+
+
+def test_parts_of_a_piece_with_a_nook_are_cut_up_to_3_cm_and_larger_than_4_square_centimetres(drawn):
+    drawn.box(0.5, 0.0, 0.06, 0.06).box(0.56, 0.0, 0.04, 0.04).box(0.535, 0.0, 0.02, 0.016)
+    table = drawn.map()
+    parts = take_apart(table.objects, table, ClustersParameters())
+    assert len(parts) == 2
+    np.testing.assert_array_equal(sum(part.astype(int) for part in parts), table.objects)
+    whole = ClustersParameters(widest_neck=0.008)
+    assert len(take_apart(table.objects, table, whole)) == 1
+    assert len(take_apart(table.objects, table, ClustersParameters(smallest_part=2e-3))) == 1
+    assert len(take_apart(table.objects, table, ClustersParameters(concavity=0.03))) == 1

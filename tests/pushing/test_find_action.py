@@ -1,8 +1,15 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from riseg_drake.pushing.decision import Criterion, Ending, PathStage
-from riseg_drake.pushing.find_action import FindActionParameters, find_action
+from riseg_drake.pushing.find_action import (
+    FindActionParameters,
+    find_action,
+    stays_in_work_area,
+    touching,
+)
 from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.pushing.tried_pushes import KnownScene, TriedPush
 
@@ -249,3 +256,53 @@ def test_what_is_in_doubt_is_left_alone_where_a_push_would_stir_more_than_it_set
     decision = decide(drawn.map())
     assert decision.ending is Ending.NOTHING_VALID
     assert decision.failed[Criterion.NOT_IN_VAIN] > decision.candidates / 2
+
+
+@pytest.mark.parametrize("slope", [0.1, -0.1])
+def test_on_a_sloped_table_the_tip_keeps_its_height_over_the_highest_ground_of_its_way(drawn, slope):
+    # The table rises along x by `slope`; a push of 3 cm goes from a clearance before the contact on.
+    table = replace(drawn.disc(0.5, 0.0, 0.03).map(), plane_W=np.array([-slope, 0.0, 1.0, 0.05]))
+    push = act(table)
+    way = push.p_WB[:2] + np.outer([-1, 1], push.length * push.direction_W)
+    ground = (slope * way[:, 0] - 0.05).max()
+    assert push.length == pytest.approx(0.03)
+    assert push.p_WE[2] == pytest.approx(ground + push.tip_height)
+    assert push.p_WB[2] == pytest.approx(ground + 0.05 / 2)
+
+
+def test_a_push_is_all_that_was_found_of_it(drawn):
+    drawn.disc(0.5, 0.0, 0.03, height=0.04).box(0.4, 0.15, 0.04, 0.04, height=0.11, segmented=True)
+    decision = decide(drawn.map())
+    push = decision.push
+    assert push.tallest == pytest.approx(0.11)
+    assert push.tip_height == pytest.approx(0.008)
+    assert push.d_push == pytest.approx(0.02)
+    # 28 cm^2: that it is an object, less what touching it with a part of the bar costs.
+    area = np.count_nonzero(drawn.objects & ~drawn.segmented) * 4e-6
+    assert decision.unsettled_area == pytest.approx(area)
+    most = area / (area + 1e-3)
+    assert 0.8 * most < 1 - push.cost <= most
+    cells = drawn.centres()[drawn.objects & ~drawn.segmented]
+    np.testing.assert_allclose(push.cluster_W, cells)
+
+
+def test_what_hangs_together_is_what_touches_even_in_a_corner(drawn):
+    one, corner, apart = np.zeros((3, *drawn.objects.shape), bool)
+    one[100:110, 100:110] = corner[110:120, 110:120] = apart[121:130, 121:130] = True
+    table = drawn.put(one | corner | apart, 0.05, False).map()
+    np.testing.assert_array_equal(touching(one, table), one | corner)
+
+
+def test_a_push_may_take_out_of_the_work_area_no_more_than_lies_there(drawn):
+    # Two of ten columns of cells lie outside of x <= 0.75; a push of three more along y is as good as before.
+    cells = np.zeros(drawn.objects.shape, bool)
+    cells[140:150, 268:278] = True  # x from 0.736 to 0.754
+    table = drawn.put(cells, 0.05, False).map()
+    ways = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]])
+    assert stays_in_work_area(ways, cells, table, 0.006).tolist() == [False, True, True]
+    drawn.work_area = (0.25, 0.75, -0.28, 0.003)
+    cells = np.zeros(drawn.objects.shape, bool)
+    cells[140:150, 100:110] = True  # y from -0.02 to -0.002
+    upwards = np.array([[0.0, 1.0]])
+    assert stays_in_work_area(upwards, cells, drawn.map(), 0.004).tolist() == [True]
+    assert stays_in_work_area(upwards, cells, drawn.map(), 0.006).tolist() == [False]

@@ -3,6 +3,7 @@ import numpy as np
 from riseg_drake.pushing.objects_to_segment import (
     ObjectsToSegmentParameters,
     objects_to_segment,
+    things_to_push,
 )
 
 
@@ -37,3 +38,28 @@ def test_cells_without_depth_do_not_cut_an_object_into_specks(drawn):
     line = np.abs(drawn.centres()[..., 0] - 0.5) < 0.001
     drawn.objects[line] = False
     assert objects_to_segment(drawn.map()).any()
+
+
+def test_what_has_moved_and_is_in_doubt_is_told_from_what_never_moved_by_its_id(drawn):
+    drawn.box(0.4, 0.1, 0.04, 0.04, doubtful=3).box(0.5, 0.1, 0.016, 0.016, doubtful=4)
+    drawn.box(0.5, -0.1, 0.04, 0.04).box(0.4, -0.1, 0.04, 0.04, segmented=True)
+    table = drawn.map()
+    unmoved, doubtful = things_to_push(table)
+    np.testing.assert_array_equal(unmoved, (drawn.doubtful == 0) & drawn.objects & ~drawn.segmented)
+    np.testing.assert_array_equal(doubtful, np.where(drawn.doubtful == 3, 3, 0))  # 4 is a speck
+    # Told to take specks, they are taken.
+    small = ObjectsToSegmentParameters(minimum_area=1e-4)
+    np.testing.assert_array_equal(things_to_push(table, small)[1], drawn.doubtful)
+
+
+def test_the_rim_of_a_known_thing_does_not_count_towards_the_smallest_area(drawn):
+    # Beside it, of one width with it, 20 x 11 cells of 2 mm, of which three columns are rim.
+    known, unknown = np.zeros((2, *drawn.objects.shape), bool)
+    known[140:151, 100:130] = unknown[140:151, 130:150] = True
+    drawn.put(known, 0.05, True).put(unknown, 0.05, False)
+    enough = ObjectsToSegmentParameters(minimum_area=(17 * 11 - 0.5) * 4e-6)
+    np.testing.assert_array_equal(objects_to_segment(drawn.map(), enough), unknown)
+    too_much = ObjectsToSegmentParameters(minimum_area=(17 * 11 + 0.5) * 4e-6)
+    assert not objects_to_segment(drawn.map(), too_much).any()
+    wide = ObjectsToSegmentParameters(minimum_area=(14 * 11 - 0.5) * 4e-6, rim=0.0121)
+    np.testing.assert_array_equal(objects_to_segment(drawn.map(), wide), unknown)

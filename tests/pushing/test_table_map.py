@@ -82,3 +82,33 @@ def test_ground_follows_a_sloped_table(view):
     slope = np.array([-0.1, 0.0, 1.0, -0.02]) / np.hypot(1, 0.1)
     table = map_table(frame_of(seen), above_in(seen, slope), seen.number)
     assert table.ground(np.array([0.5, 0.3])) == pytest.approx(0.07)
+
+
+@pytest.mark.parametrize("cell", [0.0033, 0.0047])
+def test_the_map_covers_the_work_area_and_its_surround_and_no_cell_more(view, cell):
+    parameters = TableMapParameters([0.3, 0.7, -0.2, 0.4], surround=0.05, cell=cell)
+    table = map_of(view([]), parameters=parameters)
+    np.testing.assert_allclose(table.origin_W, [0.25, -0.25])
+    assert table.work_area_W == (0.3, 0.7, -0.2, 0.4)
+    last = table.origin_W + table.cell * (np.array(table.objects.shape[::-1]) - 1)
+    assert np.all((last >= [0.75, 0.45]) & (last < np.array([0.75, 0.45]) + table.cell))
+    for array in (table.segmented, table.height, table.seen):
+        assert array.shape == table.objects.shape
+
+
+def test_a_cell_is_beside_free_ones_where_one_of_its_eight_neighbours_is_free(drawn):
+    cells = np.zeros(drawn.objects.shape, bool)
+    cells[100:110, 120:135] = True
+    inner = np.zeros_like(cells)
+    inner[101:109, 121:134] = True
+    table = drawn.put(cells, 0.05, False).map()
+    np.testing.assert_array_equal(table.beside_free, ~inner)
+    assert table.to_object[100, 118] == pytest.approx(2 * 0.002, rel=0.01)
+    np.testing.assert_array_equal(table.to_object[cells], 0)
+
+
+def test_points_are_the_cells_centres_row_by_row_with_x_along_the_columns(drawn):
+    cells = np.zeros(drawn.objects.shape, bool)
+    cells[3, [5, 7]] = cells[4, 1] = True
+    expected = np.array([[0.2, -0.3]]) + 0.002 * np.array([[5, 3], [7, 3], [1, 4]])
+    np.testing.assert_allclose(drawn.map().points(cells), expected)

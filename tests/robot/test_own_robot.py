@@ -65,3 +65,56 @@ def test_what_else_is_wrong_with_a_robot_is_said_in_the_words_of_the_file(tmp_pa
     file = gantry(tmp_path, '<mesh filename="gone.obj"/>', '<mesh filename="gone.stl"/>')
     with pytest.raises(OwnRobotError, match=r"gantry\.urdf: .*gone\.obj.*does not exist"):
         OwnRobot(file, "eye", ["x"])
+
+
+TWO_JOINTS = """<robot name="crane"><link name="base"/><link name="mast"/><link name="arm"/>
+<joint name="turn" type="revolute"><parent link="base"/><child link="mast"/><axis xyz="0 0 1"/>
+<limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+<joint name="reach" type="prismatic"><parent link="mast"/><child link="arm"/><axis xyz="1 0 0"/>
+<origin xyz="0.1 0 0.4"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+
+
+@pytest.fixture
+def crane(tmp_path):
+    (tmp_path / "crane.urdf").write_text(TWO_JOINTS)
+    return tmp_path / "crane.urdf"
+
+
+@pytest.mark.parametrize(
+    ("joints", "q"),
+    [(["turn", "reach"], [0.5, 0.2]), (["reach", "turn"], [0.2, 0.5]), (["a", "b"], [0.5, 0.2])],
+)
+def test_joints_go_by_their_names_and_by_the_files_order_where_the_names_are_others(crane, joints, q):
+    X_WC = OwnRobot(crane, "arm", joints).X_WC(np.array(q))
+    c, s = np.cos(0.5), np.sin(0.5)
+    expected = [[c, -s, 0, 0.3 * c], [s, c, 0, 0.3 * s], [0, 0, 1, 0.4], [0, 0, 0, 1]]
+    np.testing.assert_allclose(X_WC, expected, atol=1e-12)
+
+
+def test_of_some_joints_by_name_the_others_stay_at_rest(crane):
+    robot = OwnRobot(crane, "arm", ["reach"])
+    np.testing.assert_allclose(robot.X_WC(np.array([0.2]))[:3, 3], [0.3, 0, 0.4], atol=1e-12)
+    # Asked again it is by the new angles alone, and of any frame.
+    np.testing.assert_allclose(robot.X_WC(np.array([-0.1]))[:3, 3], [0.0, 0, 0.4], atol=1e-12)
+    mast = robot.plant.GetFrameByName("mast")
+    np.testing.assert_allclose(robot.X_WA(np.array([0.7]), mast), np.eye(4), atol=1e-12)
+
+
+def test_its_base_is_bolted_to_the_origin_and_all_of_it_is_the_robots(crane):
+    robot = OwnRobot(crane, "base", ["turn", "reach"])
+    np.testing.assert_allclose(robot.X_WC(np.array([1.0, 0.3])), np.eye(4), atol=1e-12)
+    assert robot.plant.num_positions() == 2
+    assert [robot.plant.GetModelInstanceName(model) for model in robot.models] == ["crane"]
+
+
+def test_too_few_or_too_many_joints_are_named_with_those_of_the_file(crane):
+    for joints in (["a"], ["a", "b", "c"], ["turn", "b", "reach"]):
+        with pytest.raises(OwnRobotError, match=rf"2 movable joints \(turn, reach\).* has {len(joints)};"):
+            OwnRobot(crane, "arm", joints)
+
+
+def test_a_camera_frame_that_is_not_there_is_named_with_those_that_are(crane):
+    with pytest.raises(OwnRobotError, match=r"no frame 'eye'; it has .*base.*mast.*arm"):
+        OwnRobot(crane, "eye", ["turn", "reach"])
+    with pytest.raises(OwnRobotError, match="is not there"):
+        OwnRobot(crane.with_name("gone.urdf"), "eye", [])

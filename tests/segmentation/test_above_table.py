@@ -6,8 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from riseg_drake.geometry.camera import rays
-from riseg_drake.segmentation.above_table import AboveTableParameters, objects_above_table
+from riseg_drake.geometry.camera import Intrinsics, rays
+from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.segmentation.above_table import (
+    AboveTableParameters,
+    _colored_like_things,
+    _depth_noise,
+    _enclosed,
+    _high,
+    _without_specks,
+    objects_above_table,
+)
 from tests.segmentation.drawn_room import KINDS, draw_room
 from tests.segmentation.drawn_scene import CAMERA, DrawnScene, Texture, looking_down, planar
 
@@ -188,3 +197,125 @@ def test_an_object_that_touches_the_wall_is_found_and_the_wall_is_not() -> None:
     assert np.mean(wall) > 0.2
     assert np.mean(above.mask[wall]) < 0.02
     assert np.mean(above.mask[label > 0]) > 0.9
+
+
+SMALL = Intrinsics(60, 40, 100.0, 100.0, 29.5, 19.5)
+
+
+def small(depth=0.5, color=90, robot=None):
+    """A picture of one depth and colour, or of given ones [40, 60, ...]."""
+    shape = SMALL.shape
+    pixels = np.broadcast_to(np.asarray(color, np.uint8), (*shape, 3)).copy()
+    seen = np.broadcast_to(np.float32(depth), shape).copy()
+    return Frame(0, 0.0, SMALL, pixels, seen, np.eye(4), np.zeros(shape, bool) if robot is None else robot)
+
+
+def test_what_may_stand_there_is_higher_than_its_foot_and_what_surely_does_than_the_noise_of_its_depth() -> (
+    None
+):
+    parameters = AboveTableParameters(height_min=0.004, noise_multiple=4.0, foot_multiple=2.0)
+    depth = np.full(SMALL.shape, 0.5)
+    depth[:, 30:] = 1.0
+    height, robot = np.zeros((2, *SMALL.shape))
+    for column, h in ((0, 0.0039), (1, 0.0041), (30, 0.0059), (31, 0.0061), (32, 0.0119), (33, 0.0121)):
+        height[:, column] = h
+    robot[:10] = 1
+    high, clearly = _high(height.astype(np.float32), small(depth, robot=robot > 0), 0.003, parameters)
+    # At 1 m 6 and 12 mm; at half a metre a quarter of that, and 4 mm at least.
+    assert np.flatnonzero(high[20]).tolist() == [1, 31, 32, 33]
+    assert np.flatnonzero(clearly[20]).tolist() == [1, 33]
+    assert not high[:10].any()
+    # Where all noise is lower than the lowest object, both are one.
+    high, clearly = _high(height.astype(np.float32), small(depth), 0.0009, parameters)
+    assert np.flatnonzero(high[20]).tolist() == [1, 30, 31, 32, 33]
+    assert clearly is None
+
+
+def without_specks(mask, frame=None, raised=None, clearly=None, area_min=9 / 1e4):
+    """Of nine pixels and more, where a square metre has 10,000 at 1 m."""
+    raised = mask if raised is None else raised
+    return _without_specks(mask, raised, clearly, small() if frame is None else frame, area_min)
+
+
+def masked(*places):
+    mask = np.zeros(SMALL.shape, bool)
+    for place in places:
+        mask[place] = True
+    return mask
+
+
+def test_pieces_of_less_than_the_least_area_or_of_which_less_rises_clearly_are_none() -> None:
+    large, small_ = masked(np.s_[10:13, 10:13]), masked(np.s_[20:22, 30:34])
+    np.testing.assert_array_equal(without_specks(large | small_), large)
+    np.testing.assert_array_equal(without_specks(large | small_, area_min=8 / 1e4), large | small_)
+    wide = masked(np.s_[25:30, 10:20])
+    for rows, kept in ((np.s_[25:28, 10:13], True), (np.s_[25:27, 10:14], False)):
+        assert without_specks(wide, clearly=masked(rows)).any() == kept
+    # By a corner alone pieces do not hang together.
+    stairs = masked(np.s_[5:7, 5:9], np.s_[7:9, 9:13])
+    assert not _without_specks(stairs, stairs, None, small(), 9 / 1e4)[7, 9]
+
+
+def test_a_pinhole_is_closed_and_a_hole_that_is_enclosed_without_depth_is_filled_but_not_the_robot() -> None:
+    ring = masked(np.s_[10:22, 10:26])
+    ring[13:19, 13:23] = False
+    np.testing.assert_array_equal(without_specks(ring), ring)  # there is a table in it
+    depth = np.full(SMALL.shape, 0.5)
+    depth[13:19, 13:23] = 0
+    full = masked(np.s_[10:22, 10:26])
+    np.testing.assert_array_equal(without_specks(ring, small(depth)), full)
+    np.testing.assert_array_equal(without_specks(ring, raised=full), full)
+    robot = masked(np.s_[15:17, 15:20])
+    np.testing.assert_array_equal(without_specks(ring, small(depth, robot=robot)), full & ~robot)
+    pinhole = full.copy()
+    pinhole[15, 15] = False
+    np.testing.assert_array_equal(without_specks(pinhole), full)
+
+
+def test_a_hole_is_enclosed_where_it_borders_on_nothing_else_and_not_on_the_pictures_end() -> None:
+    around = np.zeros((12, 20), np.uint8)
+    around[2:8, 2:8] = 1
+    holes = np.zeros((12, 20), bool)
+    holes[4:6, 4:6] = True
+    assert _enclosed(holes, around & ~holes.view(np.uint8))[4:6, 4:6].all()
+    for v, u in ((2, 4), (7, 4), (4, 2), (4, 7)):
+        # A way out to each side.
+        opened = holes.copy()
+        opened[min(v, 4) : max(v, 5) + 1, min(u, 4) : max(u, 5) + 1] = True
+        assert not _enclosed(opened, around & ~opened.view(np.uint8)).any()
+    for turn in range(4):
+        # Of a picture full of things the hole at its side goes on beyond.
+        full, at_end = np.ones((2, 12, 12), np.uint8)
+        at_end[:] = 0
+        at_end[0, 5:7] = 1
+        at_end = np.rot90(at_end, turn).copy()
+        assert not _enclosed(at_end > 0, full & ~at_end).any()
+
+
+def test_without_depth_what_has_the_colour_of_the_thing_beside_it_is_its_own() -> None:
+    color = np.full((*SMALL.shape, 3), 200)
+    color[:, :30] = [160, 40, 40]
+    thing, table = masked(np.s_[:, :26]), masked(np.s_[:, 34:])
+    places = np.nonzero(~thing & ~table)
+    like = np.zeros(SMALL.shape, bool)
+    like[places] = _colored_like_things(places, color.astype(np.uint8), thing, table)
+    np.testing.assert_array_equal(like[places], (places[1] < 30))
+    # With no table about, there is nothing else that it could be; with no thing about, it is none.
+    nothing = np.zeros(SMALL.shape, bool)
+    assert _colored_like_things(places, color.astype(np.uint8), thing, nothing).all()
+    assert not _colored_like_things(places, color.astype(np.uint8), nothing, table).any()
+
+
+def test_depths_noise_is_the_root_mean_square_of_heights_by_squared_depth() -> None:
+    parameters = AboveTableParameters()
+    depth = np.full((100, 150), 0.5, np.float32)
+    depth[:, 75:] = 1.0
+    height = np.where(depth == 0.5, 0.002 * 0.25, -0.004).astype(np.float32)
+    on_table = np.ones((20, 30), bool)
+    expected = np.sqrt((0.002**2 + 0.004**2) / 2)
+    assert _depth_noise(height, depth, on_table, parameters) == pytest.approx(expected)
+    few = np.zeros((20, 30), bool)
+    few.ravel()[:99] = True
+    assert _depth_noise(height, depth, few, parameters) == parameters.plane.depth_noise
+    few.ravel()[99] = True
+    assert _depth_noise(height, depth, few, parameters) < 0.004

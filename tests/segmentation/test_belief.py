@@ -10,6 +10,7 @@ from riseg_drake.segmentation.belief import (
     BeliefParameters,
     Bodies,
     Origin,
+    _most_seen,
     carried_evidence,
     completed,
     rebased,
@@ -95,3 +96,43 @@ def test_what_is_uncovered_takes_the_id_of_most_of_its_part_and_what_was_known_k
     known = np.array([True, True, False, True, False, True, False])
     area = np.array([30, 10, 10, 10, 11, 11, 10])
     np.testing.assert_array_equal(completed(body, known, part, area), [4, 0, 4, 5, 0, 6, 6])
+
+
+def test_a_border_is_remembered_by_both_its_sides_whichever_way_round_and_whatever_its_number():
+    # Five superpixels in a new order: 4 was 0, 3 was 1, and so on; each old border has evidence of its own.
+    old_borders = [[0, 1], [0, 2], [1, 3], [2, 3], [2, 4], [3, 4]]
+    evidence = np.array([1.0, -2.0, 3.0, -4.0, 5.0, -6.0])
+    origin = Origin(source=np.arange(5)[::-1], body=np.zeros(5, int), moved=np.zeros(5, bool))
+    new_borders = sorted(sorted(4 - side for side in border) for border in old_borders)
+    told = carried(old_borders, evidence, np.zeros(5, int), new_borders, origin)
+    expected = [evidence[old_borders.index(sorted(4 - side for side in border))] for border in new_borders]
+    assert told == pytest.approx(expected)
+
+
+def test_what_was_one_superpixel_is_one_and_what_was_not_a_border_is_by_its_bodies():
+    # 0 and 1 were one; 1 and 2 never touched, and are bodies 5 and 6; 2 and 3 never touched and are body 6.
+    origin = Origin(np.array([0, 0, 1, 2]), np.array([5, 5, 6, 6]), np.ones(4, bool))
+    told = carried([[0, 3]], [9.0], np.array([5, 6, 6, 0]), [[0, 1], [1, 2], [2, 3]], origin)
+    assert told == pytest.approx([2.0, -4.0, 1.0])
+
+
+def test_a_gap_that_was_seen_once_is_remembered_when_it_has_closed():
+    origin = Origin(np.array([0, 1]), np.zeros(2, int), np.zeros(2, bool))
+    for prior, remembered in ((2.0, 3.0), (2.5, 2.5), (1.0, 3.0)):  # it was 2 in the old picture
+        told = carried([[0, 1]], [3.0], np.zeros(2, int), [[0, 1]], origin, prior=prior)
+        assert told == pytest.approx([remembered])
+
+
+def test_what_was_known_of_no_body_says_nothing_of_what_comes_into_sight():
+    origin = Origin(np.array([0, -1, -1]), np.zeros(3, int), np.zeros(3, bool))
+    assert carried([[0, 1]], [3.0], np.zeros(2, int), [[1, 2]], origin) == pytest.approx([0.0])
+
+
+def test_the_value_that_a_superpixel_shows_most_is_told():
+    label = np.array([[0, 0, 0, 1], [0, 0, 1, 1], [-1, 2, 2, 2]])
+    image = np.zeros((4, 6), int)
+    image[1:, 2:] = [[7, 7, 3, 9], [7, 3, 9, 0], [5, 0, 0, 4]]
+    keyframe = SimpleNamespace(
+        superpixels=SimpleNamespace(label=label), region=(slice(1, 4), slice(2, 6)), count=3
+    )
+    assert _most_seen(keyframe, image).tolist() == [7, 9, 0]

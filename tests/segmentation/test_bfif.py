@@ -1,12 +1,15 @@
 """Lines 3 to 6 of Alg. 2 on rendered bodies whose motions are known."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from riseg_drake.geometry.camera import rays
 from riseg_drake.geometry.se3 import inverse, log_se3, move_points
+from riseg_drake.segmentation import bfif
 from riseg_drake.segmentation.above_table import AboveTableParameters, objects_above_table
-from riseg_drake.segmentation.bfif import BFIFParameters, group_body_frames
+from riseg_drake.segmentation.bfif import BFIFParameters, group_body_frames, no_groups
 from riseg_drake.segmentation.body_frames import BodyFrameParameters
 from riseg_drake.segmentation.expected_flow import expected_flow
 from riseg_drake.segmentation.grouping import GroupingParameters
@@ -120,3 +123,36 @@ def test_the_papers_own_version_runs_and_finds_its_groups_on_what_moves(two_move
 
 def test_the_papers_own_version_finds_nothing_where_nothing_moves(none_moves) -> None:
     assert len(grouped(none_moves, literal())) == 0
+
+
+def test_groups_that_turn_out_to_have_one_motion_are_one_with_the_motion_of_all(one_moves, monkeypatch) -> None:
+    # The paper's clustering could have cut a body in two: here every second frame goes to another group.
+    whole = grouped(one_moves)
+    monkeypatch.setattr(bfif, "group_twists", lambda twists, _: np.arange(len(twists.V_S)) % 2)
+    cut = grouped(one_moves)
+    assert len(cut) == 1
+    assert (cut.group == 0).all()
+    under = one_moves.label_0[tuple(cut.pixel.T)]
+    away, turned = motion_errors(cut.motion_C0[0], one_moves.motion_C0[2], one_moves, 2)
+    assert np.mean(under == 2) > 0.9
+    assert away < 1e-3
+    assert turned < np.deg2rad(1.0)
+    assert cut.flow_span == pytest.approx(whole.flow_span, rel=0.05)
+
+
+def test_frames_that_no_rigid_motion_explains_are_those_beyond_so_many_times_the_usual_misfit() -> None:
+    def kept(misfit, most):
+        return bfif._on_one_body(SimpleNamespace(misfit=np.array(misfit)), most).tolist()
+
+    assert kept([2.0, 4.0, 4.0, 11.9, 12.1], 3.0) == [True, True, True, True, False]
+    # Where most fit better than noise would have it, noise is what is usual.
+    assert kept([0.1, 0.2, 0.2, 2.9, 3.1], 3.0) == [True, True, True, True, False]
+
+
+def test_no_groups_are_none_in_every_array() -> None:
+    none = no_groups(0.7)
+    shapes = [array.shape for array in (none.pixel, none.V_S, none.covariance, none.motion_C0, none.p_C0Q)]
+    assert shapes == [(0, 2), (0, 6), (0, 6, 6), (0, 4, 4), (0, 3)]
+    assert none.group.shape == (0,)
+    assert (len(none), none.flow_span, no_groups().flow_span) == (0, 0.7, 0.0)
+    np.testing.assert_array_equal(none.p_C0S, np.zeros(3))

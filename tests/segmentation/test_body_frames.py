@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from riseg_drake.geometry.camera import project
 from riseg_drake.geometry.se3 import move_points
 from riseg_drake.segmentation.body_frames import BodyFrameParameters, sample_body_frames, track_points
 from tests.segmentation.drawn_scene import (
@@ -152,3 +153,21 @@ def test_an_unknown_kind_is_refused_with_the_choices(scene) -> None:
 
 def test_where_nothing_moves_there_are_no_frames(scene) -> None:
     assert len(sample(scene, np.zeros(CAMERA.shape, bool))) == 0
+
+
+@pytest.mark.parametrize("corner", [np.s_[:8, :8], np.s_[:8, -8:], np.s_[-8:, :8], np.s_[-8:, -8:]])
+def test_in_each_corner_of_the_image_frames_reach_its_last_pixels_and_none_beyond(scene, corner) -> None:
+    pair, _, _ = scene
+    moving = np.zeros(CAMERA.shape, bool)
+    moving[corner] = True
+    depth = np.full(CAMERA.shape, 0.45, np.float32)
+    flat = replace(
+        pair, reference=replace(pair.reference, depth=depth), current=replace(pair.current, depth=depth)
+    )
+    flow = np.zeros((*CAMERA.shape, 2), np.float32)
+    frames = sample_body_frames(
+        flat, flow, moving, SIGMA, BodyFrameParameters(count=200), np.random.default_rng(0)
+    )
+    u, v = np.rint(project(frames.p_C0Q0[frames.used], CAMERA)).astype(int).T
+    rows, columns = np.nonzero(moving)
+    assert (v.min(), v.max(), u.min(), u.max()) == (rows.min(), rows.max(), columns.min(), columns.max())

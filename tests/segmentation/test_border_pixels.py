@@ -31,3 +31,14 @@ def test_beside_a_border_0_is_the_last_pixel_before_it_and_1_the_first_behind_it
     assert right.beside(image, -4).tolist() == [0, 3, 3]
     colors = np.stack([image, -image], axis=-1)
     assert right.beside(colors, 1).tolist() == [[2, -2], [4, -4], [5, -5]]
+
+
+def test_borders_are_told_by_both_their_superpixels_though_others_share_one_of_them():
+    # Every two of five superpixels touch or not: 0 1 | 2 3 | 4 in three rows.
+    label = np.array([[0, 1, 1], [2, 3, 1], [2, 4, 4]])
+    borders = np.array([[0, 1], [0, 2], [1, 3], [1, 4], [2, 3], [2, 4], [3, 4]])
+    none = np.zeros(7, bool)
+    cut = Superpixels(label, 5, borders, np.ones(7), none, none)
+    for places in border_pixels(cut):
+        sides = np.stack([places.beside(label, 0), places.beside(label, 1)], axis=1)
+        np.testing.assert_array_equal(np.sort(sides, axis=1), borders[places.border])

@@ -116,3 +116,22 @@ def test_across_a_gap_the_picture_says_as_much_as_it_may_that_two_are_two():
 
 def test_the_picture_says_nothing_of_what_may_go_on_behind_something():
     assert border_prior(two_halves(FLAT, GRAY, behind=True), BorderPriorParameters()) == pytest.approx([0.0])
+
+
+def test_a_place_without_depth_on_one_side_is_one_without_depth():
+    depth = np.ones((40, 40), np.float32)
+    depth[:10, 19] = 0
+    (cues,) = border_cues(two_halves(FLAT, GRAY, depth))
+    # A quarter of the border; of both sides' pixels 10 of 1600.
+    assert cues[3] == pytest.approx(0.25 - 10 / 1600)
+
+
+def test_a_valley_makes_one_body_less_likely_by_its_own_weight():
+    height = 0.03 + 0.0002 * np.abs(U - 19.5)
+    (cues,) = border_cues(two_halves(height, GRAY))
+    assert 0.3 < cues[1] < 1.0
+    assert cues[0] == pytest.approx(cues[1], abs=1e-3)
+    parameters = BorderPriorParameters(most=5.0)
+    assert border_prior(two_halves(height, GRAY), parameters) == pytest.approx(
+        2.5 - 0.2 * cues[0] - 0.6 * cues[1]
+    )

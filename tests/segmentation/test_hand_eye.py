@@ -67,3 +67,22 @@ def test_both_arrows_are_seen_where_the_two_flows_agree():
         around = picture[max(v - 12, 0) : v + 13, max(u - 30, 0) : u + 31]
         for color in (EXPECTED, OBSERVED):
             assert (around == color).all(axis=-1).sum() >= 8, (v, u, color)
+
+
+@pytest.mark.parametrize("speed", [0.004, 0.012])
+def test_each_frame_is_compared_with_the_latest_before_it_from_which_4_pixels_of_motion_are_to_be_seen(speed):
+    # 600 pixels a metre: 2.4 or 7.2 pixels from frame to frame.
+    errors = flow_errors([frame(k, speed * k) for k in range(4)])
+    step = 2 if speed < 4 / 600 else 1
+    assert [(e.pair.reference.sequence, e.pair.current.sequence) for e in errors] == [
+        (k - step, k) for k in range(step, 4)
+    ]
+    for error in errors:
+        np.testing.assert_allclose(error.expected[..., 0], -600 * speed * step, atol=1e-3)
+        np.testing.assert_allclose(error.mean, 0, atol=0.1)
+        assert error.size.shape == (error.usable.sum(),)
+
+
+def test_a_camera_that_moved_by_more_than_25_pixels_is_compared_with_nothing():
+    assert flow_errors([frame(0, 0.0), frame(1, 26 / 600)]) == []
+    assert len(flow_errors([frame(0, 0.0), frame(1, 24 / 600)])) == 1

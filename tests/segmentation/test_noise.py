@@ -3,9 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
+from scipy import ndimage
 
 from riseg_drake.geometry.rgbd import smooth_gray
-from riseg_drake.segmentation.noise import MeasurementNoise, depth_sigma, flow_sigma
+from riseg_drake.segmentation.noise import MeasurementNoise, depth_sigma, flow_sigma, gray_variance
 from riseg_drake.segmentation.optical_flow import DisFlow
 from tests.segmentation.drawn_scene import Texture
 
@@ -74,3 +75,20 @@ def test_it_tells_where_dense_inverse_search_goes_wrong() -> None:
 
 def test_depth_noise_grows_with_the_square_of_depth() -> None:
     np.testing.assert_allclose(depth_sigma(np.array([0.5, 1.0, 2.0]), 0.002), [0.0005, 0.002, 0.008])
+
+
+def test_flows_noise_is_that_of_the_structure_tensors_smaller_eigenvalue() -> None:
+    # Another implementation: scipy's filters, numpy's eigenvalues.
+    gray = smooth_gray(noisy(textured(10.0), np.random.default_rng(0)))
+    gradient = [ndimage.sobel(gray.astype(float), axis) / 8 for axis in (1, 0)]
+    tensor = np.array([[ndimage.uniform_filter(a * b, 9) for a in gradient] for b in gradient])
+    least = np.linalg.eigvalsh(tensor.transpose(2, 3, 0, 1))[..., 0]
+    texture = np.maximum(least - 0.057 * NOISE.color**2, 1e-3)
+    expected = np.sqrt(NOISE.flow**2 + 2 * NOISE.color**2 / (81 * texture))
+    inner = np.s_[6:-6, 6:-6]
+    np.testing.assert_allclose(flow_sigma(gray, NOISE)[inner], expected[inner], rtol=2e-3)
+
+
+def test_a_gray_value_errs_by_the_noise_of_both_images_and_a_quarter_pixel_of_its_gradient() -> None:
+    squared = np.array([0.0, 16.0, 400.0], np.float32)
+    np.testing.assert_allclose(gray_variance(squared, NOISE), [8.0, 9.0, 33.0])

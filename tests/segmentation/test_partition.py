@@ -187,3 +187,11 @@ def test_parts_do_not_depend_on_which_end_is_first(mirrored):
     part = partition(Row(), bond[::-1] if mirrored else bond, PartitionParameters())
     sizes = [np.count_nonzero(part == p) for p in part]
     assert sizes == ([3, 3, 3, 2, 2] if mirrored else [2, 2, 3, 3, 3])
+
+
+@pytest.mark.parametrize(("least", "margin"), [(10, 0.5), (11, 8.0)])
+def test_less_of_a_body_than_an_object_that_may_be_something_else_s_is_no_doubt_about_it(least, margin):
+    # 2 goes with what has not moved as soon as bonds are a little weaker: 10 pixels of 30.
+    parameters = PartitionParameters(margins=[0.5, 1.0, 2.0, 4.0])
+    bond, body = np.array([9.0, 0.3, 9.0, 9.0]), np.array([1, 1, 1, 0, 0])
+    assert margins(Row(least=least), bond, body, parameters) == {1: margin}

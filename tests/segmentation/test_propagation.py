@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from riseg_drake.geometry.rgbd import FramePair
-from riseg_drake.segmentation.propagation import UNKNOWN, carry_labels, draw_labels, nearest_label
+from riseg_drake.segmentation.propagation import UNKNOWN, carry_labels, draw_labels, nearest_label, pixels_of
 from tests.segmentation.drawn_scene import (
     CAMERA,
     DrawnScene,
@@ -178,3 +178,24 @@ def test_without_any_label_all_that_stands_there_is_unknown() -> None:
     inside[5:15, 5:35] = True
     out = nearest_label(np.zeros(inside.shape, np.uint16), inside, np.ones(inside.shape, np.float32), reach=4.0)
     np.testing.assert_array_equal(out, np.where(inside, UNKNOWN, 0))
+
+
+def test_points_are_seen_in_their_nearest_pixels_and_beyond_each_side_or_behind_in_none() -> None:
+    z = 0.7
+    seen = {
+        (0.0, 0.0): True,
+        (-0.49, -0.49): True,
+        (-0.51, 3.0): False,
+        (3.0, -0.51): False,
+        (319.49, 239.49): True,
+        (319.51, 5.0): False,
+        (5.0, 239.51): False,
+        (12.6, 7.4): True,
+    }
+    uv = np.array(list(seen))
+    k = CAMERA
+    p_CQ = z * np.column_stack([(uv[:, 0] - k.cx) / k.fx, (uv[:, 1] - k.cy) / k.fy, np.ones(len(uv))])
+    vu, inside = pixels_of(p_CQ, k)
+    assert inside.tolist() == list(seen.values())
+    np.testing.assert_array_equal(vu[inside], np.rint(uv[inside])[:, ::-1])
+    assert not pixels_of(p_CQ * [1, 1, -1], k)[1].any()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from riseg_drake.segmentation.superpixels import Superpixels
-from riseg_drake.segmentation.support import in_a_hollow, may_lie_on
+from riseg_drake.segmentation.support import _reaching, in_a_hollow, may_lie_on
 
 V, U = np.mgrid[:60, :60]
 RADIUS = np.hypot(V - 30, U - 30)
@@ -93,3 +93,27 @@ def test_along_a_border_most_of_its_pixels_decide():
 
 def test_nothing_stands_nothing_lies():
     assert len(may_lie_on(cut(np.full((60, 60), -1)), np.zeros((60, 60), np.float32))) == 0
+
+
+@pytest.mark.parametrize("turns", range(4))
+@pytest.mark.parametrize(("apart", "connected"), [(5, True), (6, False)])
+def test_places_twice_two_pixels_from_each_other_are_connected_in_every_direction(turns, apart, connected):
+    contour, outside = np.zeros((2, 30, 30), bool)
+    contour[15, 3] = contour[15, 3 + apart] = True  # the first within two pixels of the end, the other not
+    reaching = np.rot90(_reaching(np.rot90(contour, turns).copy(), outside), -turns)
+    assert reaching[15, 3]
+    assert reaching[15, 3 + apart] == connected
+    assert reaching.sum() == 1 + connected
+
+
+@pytest.mark.parametrize("turns", range(4))
+@pytest.mark.parametrize(("start", "reaches"), [(3, True), (4, False)])
+def test_a_contour_reaches_the_pictures_end_or_the_outline_from_within_twice_two_pixels(turns, start, reaches):
+    contour, outside = np.zeros((2, 30, 30), bool)
+    contour[15, start] = True
+    assert _reaching(np.rot90(contour, turns).copy(), outside).any() == reaches
+    # As near to an outline: pixels up to column 9 are outside.
+    contour, outside = np.zeros((2, 40, 40), bool)
+    outside[:, :10], contour[20, 10 + start] = True, True
+    turned = _reaching(np.rot90(contour, turns).copy(), np.rot90(outside, turns).copy())
+    assert turned.any() == reaches

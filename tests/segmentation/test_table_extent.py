@@ -170,3 +170,12 @@ def test_a_share_is_of_each_labels_own_pixels() -> None:
     label = np.array([[0, 0, 1, 1], [0, 0, 1, 2]], np.int32)
     what = np.array([[0, 1, 1, 1], [0, 0, 0, 0]], bool)
     np.testing.assert_allclose(_share(what, label, 4), [1 / 4, 2 / 3, 0, 0])
+
+
+@pytest.mark.parametrize(("apart", "parts"), [(0.14, 1), (0.28, 2)])
+def test_what_hides_the_table_by_a_hand_s_breadth_parts_it_not(apart: float, parts: int) -> None:
+    u, v = np.meshgrid(np.arange(0, 0.5 + apart, 0.01), np.arange(0, 0.4, 0.01))
+    feet = np.stack([u, v], axis=-1).astype(np.float32)
+    wide = (u < 0.3) | (u >= 0.3 + apart)
+    largest = _largest(wide, feet, TableExtentParameters().gap)
+    np.testing.assert_array_equal(largest, wide if parts == 1 else u < 0.3)

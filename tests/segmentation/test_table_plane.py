@@ -5,7 +5,7 @@ import pytest
 
 from riseg_drake.geometry.camera import rays
 from riseg_drake.geometry.plane import heights_above_plane
-from riseg_drake.segmentation.table_plane import fit_plane
+from riseg_drake.segmentation.table_plane import PlaneFitParameters, _least_squares_plane, _worth, fit_plane
 from tests.geometry.planes import CAMERA, tilted_plane
 
 
@@ -94,3 +94,38 @@ def test_image_without_a_plane_is_a_clear_error(case: str) -> None:
         depth = rng.uniform(0.3, 1.5, CAMERA.shape).astype(np.float32)
     with pytest.raises(ValueError, match="no plane"):
         fit_plane(depth, CAMERA, rng)
+
+
+def test_a_plane_is_worth_what_lies_on_it_less_what_lies_below_and_far_above_and_less_if_it_leans() -> None:
+    parameters = PlaneFitParameters()
+    upright, leaning = np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0])
+    near, far = 0.5 * parameters.object_height, 2 * parameters.object_height
+    heights = np.array([0.0, 0.0009, -0.0009, near, -near, -near, far, -far])
+    nearness = np.array([1.0, 2.0, 4.0, 8.0, 0.5, 0.25, 0.125, 16.0])
+    on, below, above = 7.0, 0.75, 0.125
+    expected = on - parameters.below_penalty * below - parameters.above_penalty * above
+    for normal, share in ((upright, 1.0), (leaning, parameters.upright_share)):
+        p_CQ = (heights[:, None] - 0.5) * normal
+        (worth,) = _worth(np.append(normal, 0.5)[None], p_CQ, np.full(8, 0.001), nearness, parameters)
+        assert worth == pytest.approx(expected * (share if expected > 0 else 1.0), rel=1e-5)
+    # What speaks against it is not less for a plane that leans.
+    p_CQ = np.array([[-0.5 - near, 0.0, 0.0]])
+    (worth,) = _worth(np.append(leaning, 0.5)[None], p_CQ, np.array([0.001]), np.ones(1), parameters)
+    assert worth == pytest.approx(-parameters.below_penalty)
+    # A plane that is as upright as can be has its worth, if some of it is against it or not.
+    (worth,) = _worth(
+        np.append(upright, 0.5)[None], p_CQ[:, [1, 0, 2]] * -1, np.array([0.001]), np.ones(1), parameters
+    )
+    assert worth == pytest.approx(-parameters.below_penalty)
+
+
+def test_the_plane_of_least_squares_weighs_its_points() -> None:
+    rng = np.random.default_rng(0)
+    p_CQ = rng.normal(size=(50, 3)) * [1, 1, 0.02] + [0, 0, 2.0]
+    count = rng.integers(1, 5, 50)
+    plane_C = _least_squares_plane(p_CQ, count.astype(float))
+    repeated = np.repeat(p_CQ, count, axis=0)
+    normal = np.linalg.svd(repeated - repeated.mean(0))[2][2]
+    np.testing.assert_allclose(np.abs(plane_C[:3] @ normal), 1, atol=1e-9)
+    assert plane_C[:3] @ repeated.mean(0) + plane_C[3] == pytest.approx(0, abs=1e-9)
+    assert plane_C[3] > 0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from riseg_drake.segmentation.walls import WallParameters, find_walls, in_walls
+from riseg_drake.segmentation.walls import WallParameters, _fitted_line, _lines, find_walls, in_walls
 
 
 def seen(wall_at: float, width: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -50,3 +50,37 @@ def test_two_walls_of_a_corner_are_both_found() -> None:
     )
     assert len(walls) == 2
     np.testing.assert_allclose(walls[np.argsort(-np.abs(walls[:, 1]))], [[0, -1, 1.2], [1, 0, 0.5]], atol=0.01)
+
+
+@pytest.mark.parametrize(("points", "walls"), [(340, 1), (275, 0)])
+def test_a_point_behind_a_line_weighs_against_it_as_much_as_two_on_it(points: int, walls: int) -> None:
+    # Of a line with 400 points and 50 behind it, and one with nothing behind it, the one worth more is asked
+    # first; the first is no wall, as a tenth and more lies behind it, and with that the search ends.
+    rng = np.random.default_rng(3)
+    first = np.column_stack([np.full(400, -0.5), rng.uniform(-0.6, 0.6, 400)])
+    behind, beside = (
+        np.column_stack([rng.uniform(*x, n), np.full(n, 1.2)])
+        for x, n in (((-0.9, -0.7), 50), ((-0.3, 0.8), points - 50))
+    )
+    feet = np.vstack([first, behind, beside]).astype(np.float32)
+    every = np.ones(len(feet), np.float32)
+    assert len(find_walls(feet, 0.3 * every, 0.5 * every, WallParameters())) == walls
+
+
+def test_a_line_is_that_of_least_squares_with_the_camera_before_it() -> None:
+    points = np.array([[0.0, 1.0], [1.0, 1.2], [2.0, 1.4]])
+    for sign in (1, -1):
+        line = _fitted_line(sign * points)
+        expected = np.array([0.2, -1.0, sign * 1.0]) / np.hypot(0.2, 1.0) * sign
+        np.testing.assert_allclose(line, expected, atol=1e-9)
+    two = _lines(np.array([[0.0, 1.0], [0, 0]]), np.array([[1.0, 1.0], [0.05, 0.05]]))
+    np.testing.assert_allclose(two, [[0, -1, 1]], atol=1e-12)  # nearer than 10 cm there is none
+
+
+def test_a_walls_points_appear_before_and_behind_it_by_three_deviations_of_depth() -> None:
+    parameters, wall = WallParameters(thickness=0.01, depth_noise=0.002), np.array([[0.0, -1.0, 1.2]])
+    for depth, reach in ((1.0, 0.016), (2.0, 0.034)):
+        feet = np.array([[0.3, 1.2 - reach - 1e-4], [0.3, 1.2 - reach + 1e-4], [0.0, 5.0]], np.float32)
+        inside = in_walls(wall, feet, np.full(3, depth, np.float32), parameters)
+        assert inside.tolist() == [False, True, True]
+    assert not in_walls(np.empty((0, 3)), feet, np.ones(3), parameters).any()

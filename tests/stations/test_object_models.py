@@ -1,7 +1,8 @@
+import numpy as np
 import pytest
 import trimesh
 
-from riseg_drake.stations.object_models import SceneError, find_models, with_remedy
+from riseg_drake.stations.object_models import SceneError, find_model, find_models, with_remedy
 
 CUBE = "\n".join(
     [
@@ -104,3 +105,90 @@ def test_the_remedy_for_a_mesh_without_normals_gives_it_some(tmp_path):
     file.write_text(CUBE)
     trimesh.load(file, process=False).export(file, include_normals=True)
     assert len([line for line in file.read_text().splitlines() if line.startswith("vn ")]) >= 8
+
+
+def box_model(folder, name="brick", inertial="<mass>0.2</mass>", shape="", pose="", more="", sees=None):
+    shape = shape or "<box><size>0.04 0.06 0.02</size></box>"
+    body = f"<geometry>{shape}</geometry>"
+    seen = f"<visual name='v'>{body}</visual>" if sees is None else sees
+    path = folder / f"{name}.sdf"
+    path.write_text(
+        f"<sdf version='1.6'><model name='{name}'>{more}<link name='link'><inertial>{inertial}</inertial>"
+        f"{seen}<collision name='c'>{pose}{body}</collision></link></model></sdf>"
+    )
+    return path
+
+
+def test_a_box_is_measured_as_it_is_drawn(tmp_path):
+    pose = "<pose>0.01 0 0.03 0 0 0</pose>"
+    model = find_model(
+        str(box_model(tmp_path, inertial="<mass>0.2</mass><pose>0.01 0 0.03 0 0 0</pose>", pose=pose))
+    )
+    assert model.name == "brick"
+    assert model.corners.min(0) == pytest.approx([-0.01, -0.03, 0.02])
+    assert model.corners.max(0) == pytest.approx([0.03, 0.03, 0.04])
+    assert model.footprint.bottom == pytest.approx(0.02)
+    assert model.centre == pytest.approx([0.01, 0, 0.03])
+    assert model.axes.shape == (0, 3)
+    assert model.over_areas
+    assert model.X_WB.IsExactlyIdentity()
+
+
+def test_a_models_posture_is_kept_and_its_place_is_not(tmp_path):
+    model = find_model(str(box_model(tmp_path, more="<pose>1 2 3 1.5707963267948966 0 0</pose>")))
+    assert model.X_WB.translation() == pytest.approx([0, 0, 0])
+    assert model.X_WB.rotation().matrix() @ [0, 1, 0] == pytest.approx([0, 0, 1])
+    assert model.footprint.bottom == pytest.approx(-0.03)
+
+
+def test_a_can_turns_about_its_axis_and_a_ball_about_all_three_through_the_centre_of_mass(tmp_path):
+    can = "<cylinder><radius>0.03</radius><length>0.1</length></cylinder>"
+    (axis,) = find_model(str(box_model(tmp_path, "can", shape=can))).axes
+    assert np.abs(axis) == pytest.approx([0, 0, 1])
+    ball = find_model(str(box_model(tmp_path, "ball", shape="<sphere><radius>0.03</radius></sphere>")))
+    assert np.abs(np.linalg.det(ball.axes)) == pytest.approx(1)
+    # Weighted on one side, a can is no body of revolution about its centre of mass.
+    heavy = "<mass>0.2</mass><pose>0.01 0.0 0 0 0 0</pose>"
+    assert len(find_model(str(box_model(tmp_path, "leaden", inertial=heavy, shape=can))).axes) == 0
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"inertial": "<mass>0</mass>"}, "has mass 0; an object needs a positive mass"),
+        ({"more": "<static>true</static>"}, "is fixed to the world"),
+        ({"more": "<link name='second'/>"}, "has 2 bodies"),
+        ({"sees": ""}, "has nothing to see"),
+    ],
+)
+def test_what_cannot_be_pushed_or_seen_is_no_object(tmp_path, changed, said):
+    with pytest.raises(SceneError, match=said):
+        find_model(str(box_model(tmp_path, **changed)))
+
+
+def test_models_are_found_by_name_there_or_one_folder_down_and_no_deeper(tmp_path):
+    (tmp_path / "low" / "deep").mkdir(parents=True)
+    for folder, name in ((tmp_path, "b"), (tmp_path / "low", "model"), (tmp_path / "low" / "deep", "c")):
+        box_model(folder, name)
+    assert [model.name for model in find_models(str(tmp_path))] == ["b", "low"]
+    assert [model.name for model in find_models([str(tmp_path)], ["low"])] == ["low"]
+    for names in (["c"], ["b", "c"]):
+        with pytest.raises(SceneError, match="no model c; there are b, low"):
+            find_models(str(tmp_path), names)
+    with pytest.raises(SceneError, match="both called b"):
+        find_models([str(tmp_path), str(tmp_path)])
+    with pytest.raises(SceneError, match="no folder; expected"):
+        find_models([])
+    with pytest.raises(SceneError, match="is not a folder"):
+        find_models(str(tmp_path / "b.sdf"))
+
+
+def test_one_model_is_found_by_its_file_or_as_the_only_one_of_its_folder(tmp_path):
+    (tmp_path / "brick").mkdir()
+    assert find_model(str(box_model(tmp_path / "brick", "model"))).name == "brick"
+    assert find_model(str(tmp_path / "brick")).name == "brick"
+    box_model(tmp_path / "brick", "second")
+    with pytest.raises(SceneError, match="2 models in"):
+        find_model(str(tmp_path / "brick"))
+    with pytest.raises(SceneError, match="no file"):
+        find_model(str(tmp_path / "gone.sdf"))

@@ -199,3 +199,8 @@ def test_what_goes_wrong_in_the_worker_is_not_lost(drawn_frames):
         alone.finish()
     with pytest.raises(ValueError, match="out of memory"):
         alone.tick(2, ArmPhase.PUSH)
+
+
+def test_before_the_first_refined_mask_there_is_one_of_no_pixel_from_before_all_time():
+    assert NO_REFINED_MASK.time == -np.inf
+    assert NO_REFINED_MASK.mask is NO_MASK

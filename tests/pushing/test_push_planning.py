@@ -1,0 +1,70 @@
+"""What planning hands on: the camera's view as a map, the heading, the tried pushes, the arm's path."""
+
+import numpy as np
+import pytest
+
+from riseg_drake.pushing import push_planning
+from riseg_drake.pushing.push import NO_PUSH
+from riseg_drake.pushing.push_planning import PushPlanningParameters, plan_push
+
+Q = np.arange(7.0)
+
+
+class Arm:
+    """Its tip's x axis is not level, and so shorter from above."""
+
+    def X_WE(self, q):
+        assert q is Q
+        X_WE = np.eye(4)
+        X_WE[:3, 0] = [0.3, -0.4, np.sqrt(0.75)]
+        return X_WE
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """What each of the three steps was given, and what it gave."""
+    given = {}
+
+    def step(name):
+        def calc(*arguments):
+            given[name] = arguments
+            return name
+
+        return calc
+
+    for name in ("map_table", "find_action", "plan_push_path"):
+        monkeypatch.setattr(push_planning, name, step(name))
+    return given
+
+
+def test_each_step_gets_what_it_asks_for_and_the_heading_is_the_tip_s_level_direction(asked):
+    parameters, arm, rng, tried = PushPlanningParameters(), Arm(), np.random.default_rng(0), ("tried",)
+    assert plan_push("frame", "above", "mask", Q, arm, rng, tried, parameters, "found") == "find_action"
+    assert asked["map_table"] == ("frame", "above", "mask", parameters.action.table, "found")
+    known, generator, action, path_of = asked["find_action"]
+    assert (known.table, known.tried, generator) == ("map_table", tried, rng)
+    assert action is parameters.action
+    np.testing.assert_allclose(known.heading_W, [0.6, -0.8])
+    assert path_of("push") == "plan_push_path"
+    assert asked["plan_push_path"] == ("push", arm, Q, parameters.action.pusher, parameters.path)
+
+
+def test_without_parameters_the_defaults_are_taken_and_given_ones_are_not_replaced(asked):
+    plan_push("frame", "above", "mask", Q, Arm(), np.random.default_rng(0))
+    assert asked["find_action"][2] == PushPlanningParameters().action
+    assert asked["map_table"][4] is None
+    given = PushPlanningParameters()
+    given.action.paths = 3
+    plan_push("frame", "above", "mask", Q, Arm(), np.random.default_rng(0), parameters=given)
+    assert asked["find_action"][2].paths == 3
+
+
+def test_no_push_has_the_shapes_of_a_push_and_can_never_be_the_cheapest():
+    assert [part.shape for part in (NO_PUSH.p_WE, NO_PUSH.direction_W, NO_PUSH.p_WB)] == [(3,), (2,), (3,)]
+    assert NO_PUSH.center_W.shape == (2,)
+    assert NO_PUSH.cluster_W.shape == (0, 2)
+    for part in (NO_PUSH.p_WE, NO_PUSH.direction_W, NO_PUSH.p_WB, NO_PUSH.center_W):
+        np.testing.assert_array_equal(part, 0)
+    assert (NO_PUSH.length, NO_PUSH.d_push, NO_PUSH.tip_height, NO_PUSH.tallest) == (0, 0, 0, 0)
+    assert NO_PUSH.cost == np.inf
+    assert NO_PUSH.path is None
