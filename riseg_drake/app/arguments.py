@@ -11,6 +11,7 @@ from riseg_drake.app.driver_options import (
     add_drive_camera_options,
 )
 from riseg_drake.app.export_options import add_export
+from riseg_drake.app.measuring_options import add_bench_options, add_score_options
 from riseg_drake.app.options import (
     add_overwrite,
     add_rerun,
@@ -259,55 +260,24 @@ def command_line() -> argparse.ArgumentParser:
     convert.add_argument("output", type=Path, metavar="FOLDER", help="a new folder")
     add_source(convert)
 
-    score = _add(
-        subparsers,
-        "score",
-        commands.score,
-        "Compare two folders of label PNGs with equal names, image by image.\n"
-        "Prints the ten figures of the field's protocol, as means over the images.",
-    )
-    score.add_argument("predicted", type=Path, metavar="PREDICTED", help="folder of predicted masks")
-    score.add_argument("true", type=Path, metavar="TRUE", help="folder of true masks")
-    score.add_argument("--json", type=Path, metavar="FILE", help="also write all figures, per image too")
-    score.add_argument(
-        "--ignore",
-        type=seed_number,
-        metavar="ID",
-        help="true value whose pixels do not count (none; VOC, DAVIS: 255)",
-    )
-    score.add_argument(
-        "--background",
-        type=seed_number,
-        metavar="ID",
-        help="true value that is background beside 0 (none; the table of UOIS and OCID: 1)",
-    )
-    score.add_argument(
-        "--predicted-background", type=seed_number, metavar="ID", help="the same of the predicted masks (none)"
+    add_score_options(
+        _add(
+            subparsers,
+            "score",
+            commands.score,
+            "Compare two folders of label PNGs with equal names, image by image.\n"
+            "Prints the ten figures of the field's protocol, as means over the images.",
+        )
     )
 
-    bench = _add(
-        subparsers,
-        "bench",
-        commands.bench,
-        "Measure time and memory of every stage of the segmentation for a 640x480 image pair.\n"
-        "The pairs are a rendered push, held in memory; nothing is written.",
-    )
-    add_scenario(bench)
-    bench.add_argument(
-        "--seed", type=seed_number, default=0, metavar="N", help="draws the scene and the noise (0)"
-    )
-    bench.add_argument(
-        "--stream",
-        type=positive,
-        metavar="SECONDS",
-        help="measure instead how evenly commands for a real arm are sent beside the segmentation",
-    )
-    bench.add_argument(
-        "--stops", action="store_true", help="measure instead how soon a moving arm stands still, over LCM"
-    )
-    bench.add_argument("--raft", action="store_true", help="measure RAFT instead, small and large")
-    bench.add_argument(
-        "--sam", action="store_true", help="measure Segment Anything instead, and the frames beside it"
+    add_bench_options(
+        _add(
+            subparsers,
+            "bench",
+            commands.bench,
+            "Measure time and memory of every stage of the segmentation for a 640x480 image pair.\n"
+            "The pairs are a rendered push, held in memory; nothing is written.",
+        )
     )
 
     doctor = _add(
