@@ -101,7 +101,7 @@ class BagReader(RecordedSource):
 
     def frames_at(self, numbers: Sequence[int]) -> dict[int, RecordedFrame | None]:
         """Some frames by their numbers, from 0, in one pass; None for those that are damaged."""
-        wanted, found = set(numbers), {}
+        wanted, found = set(numbers), dict[int, RecordedFrame | None]()
         for number, images in enumerate(self._messages()):
             if number in wanted:
                 try:
