@@ -1,10 +1,11 @@
 """The door to the library that reads bags."""
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from riseg_drake.host.files import MOST_SETTINGS, FileError, is_file, read_text
+from riseg_drake.host.files import MOST_SETTINGS, MOST_TEXT, FileError, is_file, read_bytes, read_text
 from riseg_drake.recording.bag_messages import BagMessages
 from riseg_drake.recording.layout import RecordingError
 from riseg_drake.recording.realsense_file import RealSenseFile, is_realsense
@@ -14,6 +15,7 @@ SUFFIXES = (".bag", ".db3", ".mcap")
 """Of files with recorded messages."""
 METADATA = "metadata.yaml"
 """In the folder of a bag of ROS 2."""
+_FIRST_LINE, _LINE_LENGTH = re.compile(rb"#ROSBAG V\d\.\d\n"), 13
 
 
 @contextmanager
@@ -44,9 +46,12 @@ def opened_bag(path: Path) -> Iterator[BagMessages]:
 
 def _check_files(path: Path) -> None:
     """Raise RecordingError for what the library would wait for, or take in whole, whatever it is."""
-    if not path.is_dir():
-        return
     try:
+        if not path.is_dir():
+            # The library reads the first line of a bag of ROS 1, whatever its length.
+            if path.suffix == ".bag" and not _FIRST_LINE.match(read_bytes(path, MOST_TEXT, first=_LINE_LENGTH)):
+                raise RecordingError(f"{path} is no bag that can be read (it does not begin as one of ROS 1)")
+            return
         read_text(path / METADATA, MOST_SETTINGS)
     except FileError as error:
         raise RecordingError(str(error)) from None

@@ -206,3 +206,10 @@ def test_what_the_library_would_wait_for_is_refused_before(tmp_path, frames, nam
             file.truncate(3 * 2**30)
     with pytest.raises(RecordingError, match=says):
         opened_source(folder, SourceOptions())
+
+
+def test_gigabytes_without_a_first_line_are_no_bag(tmp_path):
+    with (tmp_path / "a.bag").open("wb") as file:
+        file.truncate(3 * 2**30)
+    with pytest.raises(RecordingError, match="does not begin as one of ROS 1"):
+        opened_source(tmp_path / "a.bag", SourceOptions())
