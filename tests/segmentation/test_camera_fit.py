@@ -119,7 +119,7 @@ def test_what_is_left_is_where_a_point_appears_less_where_it_should_and_much_beh
     p_C0Q = scattered(5)
     right = project(move_points(PAIR.X_C1C0, p_C0Q), K)
     p_C0Q[4] = move_points(inverse(PAIR.X_C1C0), np.array([0.1, 0.1, -0.5]))
-    apart, J = camera_motion._linearised(np.zeros(6), p_C0Q, [*right, 1.0, -2.0], PAIR)
+    apart, J = camera_motion._linearised(np.zeros(6), p_C0Q, right + np.array([1.0, -2.0]), PAIR)
     np.testing.assert_allclose(apart[:4], [[1.0, -2.0]] * 4, atol=1e-6)
     np.testing.assert_array_equal(apart[4], [1e3, 1e3])
     np.testing.assert_array_equal(J[4], 0)
