@@ -13,8 +13,8 @@ import pytest
 from pydrake.lcm import DrakeLcm
 
 from riseg_drake.robot.command_stream import CommandParameters, CommandStream
-from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.robot.description import PandaDescription
+from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.robot.limits import FR3_LIMITS
 from riseg_drake.robot.tip_geometry import TipGeometry
 from riseg_drake.stations.arm_drive import ArmDrive
@@ -22,7 +22,6 @@ from riseg_drake.stations.command_session import CommandSession, command_message
 from riseg_drake.stations.drive_process import DriveProcess
 from riseg_drake.stations.franka_link import FrankaLink
 from riseg_drake.stations.lcm_channels import LcmConfig
-from riseg_drake.stations.rate_limiter import TICK
 
 SERVER = Path(__file__).with_name("franka_server.py")
 PYTHON = "RISEG_FRANKA_SIM_PYTHON"

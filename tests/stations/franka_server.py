@@ -56,9 +56,8 @@ import franka_sim.server.state_stream as state_stream  # noqa: E402
 import numpy as np  # noqa: E402
 from franka_sim import FrankaSimServer  # noqa: E402
 from franka_sim.franka_protocol import Command, ConnectStatus, MessageHeader  # noqa: E402
-from franka_sim.motion_limits import JOINT_VELOCITY_VIOLATION_INDEX  # noqa: E402
 from franka_sim.limits.checker import Violation  # noqa: E402
-
+from franka_sim.motion_limits import JOINT_VELOCITY_VIOLATION_INDEX  # noqa: E402
 
 USER_STOPPED, SPOKEN = 5, 10
 PATIENCE = 0.8  # s; libfranka itself gives up after one

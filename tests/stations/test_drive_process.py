@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from riseg_drake.pushing.push import NO_PUSH
-from riseg_drake.pushing.push_path import PushPathParameters, plan_push_path
+from riseg_drake.pushing.push_path import PlannedSpeed, PushPathParameters, plan_push_path
 from riseg_drake.pushing.pusher import Pusher
+from riseg_drake.robot.command_limiter import CommandLimits
 from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import PandaKinematics, observe_pose
 from riseg_drake.robot.limits import FR3_LIMITS
@@ -19,7 +20,10 @@ from tests.stations.franka_rig import FrankaServer, Rig, franka_python
 
 pytestmark = pytest.mark.renders
 MODES = ("position", "velocity")
-IN_MOTION = 1400  # ticks; the arm goes down to the push
+USED = CommandLimits()
+PLANNED = PlannedSpeed(0.8 * USED.velocity, 0.6 * USED.acceleration, 0.4 * USED.jerk)  # as for `riseg hardware`
+PATH = PushPathParameters(PLANNED, longest=30.0)
+IN_MOTION = 1900  # ticks; the arm goes down to the push
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +50,7 @@ def targets(kinematics, q_observe):
         tallest=0.08,
         cost=0.0,
     )
-    path = plan_push_path(push, kinematics, q_observe, Pusher(), PushPathParameters(longest=20.0))
+    path = plan_push_path(push, kinematics, q_observe, Pusher(), PATH)
     times = np.arange(0, path.trajectory.end_time() + 1.0, 0.01).clip(0, path.trajectory.end_time())
     return np.array([path.trajectory.value(time)[:, 0] for time in times])
 
