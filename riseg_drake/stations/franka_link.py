@@ -200,8 +200,8 @@ def why_not_connected(robot: str, address: str, text: str) -> str:
             "allow rtprio 99 in /etc/security/limits.conf"
         )
     return (
-        f"no robot at {address}: {told(text)}; is FCI active in Desk, and is this computer in the network of the "
-        "control box?"
+        f"no robot at {address}: {told(text)}; is FCI active in Desk, and is this computer in the control "
+        "box's network?"
     )
 
 

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.renders
 MODES = ("position", "velocity")
 USED = CommandLimits()
 PLANNED = PlannedSpeed(0.8 * USED.velocity, 0.6 * USED.acceleration, 0.4 * USED.jerk)  # as for `riseg hardware`
-PATH = PushPathParameters(PLANNED, longest=30.0)
+PATH = PushPathParameters(limits=PLANNED, longest=30.0)
 IN_MOTION = 1900  # ticks; the arm goes down to the push
 
 
@@ -56,7 +56,7 @@ def targets(kinematics, q_observe):
 
 
 def shares(rows):
-    """Largest shares of the limits of acceleration and jerk in what the robot set itself in each run of Move."""
+    """Largest shares of the limits of acceleration and jerk in what the robot set itself."""
     modes, q_d, _ = rows
     largest = np.zeros(2)
     moves = np.flatnonzero(modes == MOVE)
