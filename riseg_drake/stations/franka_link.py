@@ -94,14 +94,14 @@ class FrankaLink:
             raise RobotStopped(told(error)) from None
 
     def read(self) -> RobotReading:
-        """See Link."""
+        """See Link. Raises LinkError."""
         try:
             return reading(self._robot.read_once())
         except Exception as error:
             raise LinkError(f"the robot says nothing any more: {told(error)}") from None
 
     def control(self, is_velocity: bool, cycle: Cycle) -> None:
-        """See Link."""
+        """See Link. Raises RobotStopped and LinkError."""
         try:
             (self._control_by_callback if self._is_panda else self._control_by_loop)(is_velocity, cycle)
         except Exception as error:
@@ -112,7 +112,7 @@ class FrankaLink:
             raise
 
     def recover(self) -> None:
-        """See Link."""
+        """See Link. Raises RobotStopped."""
         try:
             self._robot.automatic_error_recovery()
         except Exception as error:
