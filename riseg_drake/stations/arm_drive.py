@@ -54,15 +54,21 @@ class RobotReading:
     mode: int
     """`robot_mode` of lcmt_panda_status, which is franka::RobotMode."""
     position: NDArray[np.float64]
-    """Measured, rad [7]; as are velocity, rad/s, torque and external torque, N m, all [7]."""
+    """Measured, rad [7]."""
     velocity: NDArray[np.float64]
+    """Measured, rad/s [7]."""
     torque: NDArray[np.float64]
+    """Measured, N m [7]."""
     torque_external: NDArray[np.float64]
+    """What the robot takes for forces from outside, N m [7]."""
     position_desired: NDArray[np.float64]
-    """What the robot makes of the last command, rad [7]; its derivatives, rad/s, rad/s^2, and torque, N m."""
+    """What the robot makes of the last command, rad [7]."""
     velocity_desired: NDArray[np.float64]
+    """The same, rad/s [7]."""
     acceleration_desired: NDArray[np.float64]
+    """The same, rad/s^2 [7]."""
     torque_desired: NDArray[np.float64]
+    """The same, N m [7]."""
     success_rate: float
     """Share of the last 100 commands that reached the robot in time, 0 to 1."""
     errors: tuple[str, ...] = ()

@@ -211,7 +211,7 @@ class CommandSession:
                 self._status = replace(self._status, contradicted=contradicted)
 
     def _hand_on_word(self, now: float, wall: float) -> None:
-        """The operator's word holds once the arm takes commands: after a stop of its own it recovers by it first."""
+        """The operator's word holds once the arm takes commands; after a stop of its own it recovers first."""
         if self._status is not None and self._status.robot_mode != MOVE:
             self._unready = now
         if not self._word_waits:

@@ -1,8 +1,11 @@
 """libfranka by its two Python bindings: pylibfranka for the Franka Research 3, panda-python for the Panda.
 
-Each is Apache-2.0 and brings its own libfranka: pylibfranka, of Franka Robotics, version 0.21, which speaks server
-version 10; panda-python, of Jean Elsner, 0.9.2, which speaks 5. Both know `readOnce` and errors by name. Of
+Each is Apache-2.0 and brings its own libfranka: pylibfranka, of Franka Robotics, version 0.21, which speaks
+server version 10; panda-python, of Jean Elsner, 0.9.2, which speaks 5. Both name errors as the robot does. Of
 libfranka's smoothing nothing is used: what is sent is within the robot's limits already.
+
+franka-rs speaks both, but its loop in Rust takes targets and makes their motion itself, with other limits and
+rules of its own for what ends it: what is tested here as `ArmDrive` would not be what moves the arm.
 """
 
 import re
@@ -91,14 +94,14 @@ class FrankaLink:
             raise RobotStopped(told(error)) from None
 
     def read(self) -> RobotReading:
-        """See Link."""
+        """See Link. Raises LinkError."""
         try:
             return reading(self._robot.read_once())
         except Exception as error:
             raise LinkError(f"the robot says nothing any more: {told(error)}") from None
 
     def control(self, is_velocity: bool, cycle: Cycle) -> None:
-        """See Link."""
+        """See Link. Raises RobotStopped and LinkError."""
         try:
             (self._control_by_callback if self._is_panda else self._control_by_loop)(is_velocity, cycle)
         except Exception as error:
@@ -109,7 +112,7 @@ class FrankaLink:
             raise
 
     def recover(self) -> None:
-        """See Link."""
+        """See Link. Raises RobotStopped."""
         try:
             self._robot.automatic_error_recovery()
         except Exception as error:
@@ -187,8 +190,8 @@ def why_not_connected(robot: str, address: str, text: str) -> str:
         other = {"fr3": "panda", "panda": "fr3"}[robot]
         return (
             f"the robot at {address} has server version {versions[1]}, and the libfranka of {PACKAGES[robot]} "
-            f"speaks version {versions[2]}: {PACKAGES[robot]} is for {_SPEAKS[robot]}; for {_SPEAKS[other]} set "
-            f"station.panda.robot: {other} and pip install 'riseg-drake[{other}]', or get the version of "
+            f"speaks version {versions[2]}: {PACKAGES[robot]} is for {_SPEAKS[robot]}; for {_SPEAKS[other]} "
+            f"set station.panda.robot: {other} and pip install 'riseg-drake[{other}]', or get the version of "
             f"{PACKAGES[robot]} that Franka's compatibility table names for the robot's system"
         )
     if "scheduling" in text or "realtime" in text.lower():
@@ -197,8 +200,8 @@ def why_not_connected(robot: str, address: str, text: str) -> str:
             "allow rtprio 99 in /etc/security/limits.conf"
         )
     return (
-        f"no robot at {address}: {told(text)}; is FCI active in Desk, and is this computer in the network of the "
-        "control box?"
+        f"no robot at {address}: {told(text)}; is FCI active in Desk, and is this computer in the control "
+        "box's network?"
     )
 
 

@@ -37,7 +37,7 @@ class LcmConfig:
 
     @property
     def recovery_channel(self) -> str:
-        """Where `riseg hardware` tells `riseg drive-arm` the operator's word that a stopped arm may move again."""
+        """Where `riseg hardware` sends the operator's word that a stopped arm may move again."""
         return f"{self.command_channel}_RECOVERY"
 
     @property

@@ -3,6 +3,7 @@
 All clocks are the robot's, and the robot waits for its client: so the machine's own speed decides nothing.
 """
 
+import gc
 import os
 import subprocess
 import tempfile
@@ -136,7 +137,13 @@ class Rig:
 
     def run(self, ticks):
         self.last = self.ticks + ticks
-        self.process.run()
+        gc.collect()
+        gc.freeze()
+        gc.disable()  # as `riseg drive-arm` does
+        try:
+            self.process.run()
+        finally:
+            gc.enable()
         return self
 
     def publish(self, values):

@@ -1,7 +1,7 @@
 """franka-sim (Apache-2.0) as a robot that is stepped with its client; run in an environment that has it.
 
-Each cycle waits for the client's answer to the one before, however long that takes, so that nothing is judged by
-wall time: the robot's clock goes by what was answered. Words on standard input make it fail; what it saw is
+Each cycle waits for the client's answer to the one before, however long that takes, so that nothing is judged
+by wall time: the robot's clock goes by what was answered. Words on standard input make it fail; what it saw is
 written to the file of the first argument when it ends: one row a cycle, robot_mode, q_d [7], q [7].
 
 franka_server.py FILE.npy ADDRESS q1,...,q7 [wall]     from where; with `wall` it keeps to real time instead
@@ -17,7 +17,7 @@ import types
 
 os.environ.pop("DISPLAY", None)
 
-LINKS = (  # where joint i sits on the link before: x, y, z, quaternion w, x; mass; of the published DH parameters
+LINKS = (  # where joint i sits on the link before: x, y, z, quaternion w, x; kg; by the published DH parameters
     ((0, 0, 0.333), (1, 0), 3.0),
     ((0, 0, 0), (1, -1), 3.0),
     ((0, -0.316, 0), (1, 1), 2.5),

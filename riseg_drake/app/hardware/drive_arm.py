@@ -95,6 +95,7 @@ class Checks:
     """Reads a robot for a while, and moves nothing; `problems` are what keeps it from being driven."""
 
     def __init__(self, link: Link, panda: PandaDescription, seconds: float = CHECKED_FOR):
+        """`seconds` is for how long it reads, s."""
         self._link, self._panda, self._seconds = link, panda, seconds
         self.problems: list[str] = []
 

@@ -1,13 +1,15 @@
 """The arm's driver against a robot that others wrote, which enforces the limits of a Franka Research 3."""
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from riseg_drake.pushing.push import NO_PUSH
-from riseg_drake.pushing.push_path import PushPathParameters, plan_push_path
+from riseg_drake.pushing.push_path import PlannedSpeed, PushPathParameters, plan_push_path
 from riseg_drake.pushing.pusher import Pusher
+from riseg_drake.robot.command_limiter import CommandLimits
 from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import PandaKinematics, observe_pose
 from riseg_drake.robot.limits import FR3_LIMITS
@@ -19,7 +21,10 @@ from tests.stations.franka_rig import FrankaServer, Rig, franka_python
 
 pytestmark = pytest.mark.renders
 MODES = ("position", "velocity")
-IN_MOTION = 1400  # ticks; the arm goes down to the push
+USED = CommandLimits()
+PLANNED = PlannedSpeed(0.8 * USED.velocity, 0.6 * USED.acceleration, 0.4 * USED.jerk)  # as for `riseg hardware`
+PATH = PushPathParameters(limits=PLANNED, longest=30.0)
+IN_MOTION = 1900  # ticks; the arm goes down to the push
 
 
 @pytest.fixture(scope="module")
@@ -46,13 +51,13 @@ def targets(kinematics, q_observe):
         tallest=0.08,
         cost=0.0,
     )
-    path = plan_push_path(push, kinematics, q_observe, Pusher(), PushPathParameters(longest=20.0))
+    path = plan_push_path(push, kinematics, q_observe, Pusher(), PATH)
     times = np.arange(0, path.trajectory.end_time() + 1.0, 0.01).clip(0, path.trajectory.end_time())
     return np.array([path.trajectory.value(time)[:, 0] for time in times])
 
 
 def shares(rows):
-    """Largest shares of the limits of acceleration and jerk in what the robot set itself in each run of Move."""
+    """Largest shares of the limits of acceleration and jerk in what the robot set itself."""
     modes, q_d, _ = rows
     largest = np.zeros(2)
     moves = np.flatnonzero(modes == MOVE)
@@ -174,19 +179,13 @@ def test_commands_that_end_or_are_none_stop_the_arm_within_limits_until_the_word
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_a_few_lost_packets_are_gone_on_from_and_more_are_a_reflex(mode, q_observe, targets):
+def test_cycles_that_do_not_wait_for_an_answer_are_gone_on_from(mode, q_observe, targets):
     with FrankaServer("127.0.0.54", q_observe) as server:
         rig = Rig(server, mode, targets[:200])
-        seen = {}
-        rig.events = {
-            IN_MOTION: lambda: server.say("lose 5"),
-            IN_MOTION + 200: lambda: seen.update(few=rig.drive.state),
-            IN_MOTION + 300: lambda: server.say("lose 60"),
-        }
-        rig.run(IN_MOTION + 500)
-    assert seen["few"] is Drive.FOLLOWING
-    assert rig.drive.state is Drive.LOST
-    assert "communication_constraints_violation" in rig.said[0]
+        rig.events = {IN_MOTION: lambda: server.say("lose 5")}
+        rig.run(IN_MOTION + 200)
+        assert REFLEX not in server.rows()[0]
+    assert rig.said == []
 
 
 def test_a_robot_that_is_gone_ends_the_driver_in_one_line(q_observe, targets):
@@ -208,9 +207,10 @@ def test_a_driver_that_is_killed_leaves_the_robot_at_rest(q_observe, targets):
             raise Killed
 
         rig.events = {IN_MOTION: kill}
-        with pytest.raises(Killed):
+        with suppress(Killed):
             rig.run(IN_MOTION + 200)
-        del rig
+        assert rig.ticks == IN_MOTION
+        rig.link.link = None  # its connection ends, as that of a process does
         link = FrankaLink("fr3", server.address)
         readings = [link.read() for _ in range(1000)]
     assert readings[-1].mode != MOVE
