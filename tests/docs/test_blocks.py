@@ -100,6 +100,10 @@ EXECUTED: dict[str, tuple[Callable[[list[str]], list[str] | None], str]] = {
         "films a run; tests/app/show/test_pictures_command.py has a small one",
     ),
     "hardware": (lambda words: None, "needs the drivers; tests/app/test_emulate.py runs it on emulated ones"),
+    "drive-arm": (
+        lambda w: False,
+        "needs a robot; tests/stations/test_drive_franka.py drives one that others wrote",
+    ),
     "drive-camera": (
         lambda words: None,
         "needs a camera; tests/app/hardware/test_drive_camera.py plays a file",

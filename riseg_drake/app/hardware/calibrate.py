@@ -65,7 +65,9 @@ def calibrate_command(request: CalibrateRequest, console: Console) -> None:
     kinematics = PandaKinematics(config.panda)
     if request.live:
         record_live(config, board, request.folder, console)
-    registration, _ = read_camera(request.folder / layout.CAMERA_FILE, request.folder)
+    registration, _, in_vain = read_camera(request.folder / layout.CAMERA_FILE, request.folder)
+    for line in in_vain:
+        console.print(f"{layout.CAMERA_FILE}: {line}", style="yellow", markup=False, highlight=False)
     k = registration.color.intrinsics
     views, without = _views(request.folder, board, kinematics)
     found = calibrated(views, k, world=world)
