@@ -101,8 +101,8 @@ EXECUTED: dict[str, tuple[Callable[[list[str]], list[str] | None], str]] = {
     ),
     "hardware": (lambda words: None, "needs the drivers; tests/app/test_emulate.py runs it on emulated ones"),
     "drive-arm": (
-        lambda w: False,
-        "needs a robot; tests/stations/test_drive_franka.py drives one that others wrote",
+        lambda words: None,
+        "needs a robot; tests/stations/test_franka_link.py drives one that others wrote",
     ),
     "drive-camera": (
         lambda words: None,
