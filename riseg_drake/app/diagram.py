@@ -174,7 +174,7 @@ def make_diagram(
     config = scenario.station
     station: SimulatedStation | HardwareStation
     try:
-        kinematics = PandaKinematics(config.panda)
+        kinematics = PandaKinematics(config.panda, config.camera.fixed_pose)
         if isinstance(config, SimulatedStationConfig):
             station = SimulatedStation(config, seed, meshcat=meshcat)
             q_observe = np.array(start_position(config))

@@ -16,6 +16,9 @@ from riseg_drake.pushing.table_map import SeenTable, map_table
 from riseg_drake.pushing.tried_pushes import KnownScene, TriedPush
 from riseg_drake.robot.kinematics import PandaKinematics
 
+LEANS = 0.1
+"""Sine of the angle from straight down from which on a fixed camera has a side that it looks from."""
+
 
 @dataclass
 class PushPlanningParameters:
@@ -51,12 +54,24 @@ def plan_push(
             them from it.
     """
     parameters = parameters or PushPlanningParameters()
-    ahead_W = kinematics.X_WE(q_observe)[:2, 0]
-    known = KnownScene(
-        map_table(frame, above, mask, parameters.action.table, found), tried, ahead_W / np.linalg.norm(ahead_W)
-    )
+    table = map_table(frame, above, mask, parameters.action.table, found)
+    known = KnownScene(table, tried, _heading(kinematics, q_observe))
 
     def path_of(push: Push) -> PushPath | PathStage:
         return plan_push_path(push, kinematics, q_observe, parameters.action.pusher, parameters.path)
 
     return find_action(known, rng, parameters.action, path_of)
+
+
+def _heading(kinematics: PandaKinematics, q_observe: NDArray) -> NDArray[np.float64] | None:
+    """The direction [2] in W in which a push is seen best; None where all are alike.
+
+    A camera on the wrist turns with the push, and turns least ahead. One that is fixed sees best what comes
+    towards it: then the tool stands behind what it pushes.
+    """
+    if kinematics.fixed_camera is None:
+        ahead_W = kinematics.X_WE(q_observe)[:2, 0]
+    else:
+        ahead_W = -kinematics.fixed_camera[:2, 2]
+    length = float(np.linalg.norm(ahead_W))
+    return ahead_W / length if length > LEANS else None

@@ -7,15 +7,19 @@ from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import Box
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, Frame, ModelInstanceIndex
 
 from riseg_drake.robot.limits import ROBOTS, RobotLimits
 
 MODELS_PACKAGE = "riseg_drake_models"
 _PACKAGE_NAMED = re.compile(r"(?:package|model)://([^/\s\"'<>]+)/")
+CAMERA_BOX = (0.14, 0.06, 0.06)
+"""A camera on a stand with its plug and clamp, m: a RealSense D435 or D415 and 2 cm to each side."""
 JOINT_NAMES = tuple(f"panda_joint{i}" for i in range(1, 8))
 
 
@@ -95,8 +99,12 @@ def find_packages(parser: Parser, file: Path) -> None:
             packages.Add(name, str(beside))
 
 
-def add_panda(plant: MultibodyPlant, description: PandaDescription) -> PandaParts:
+def add_panda(
+    plant: MultibodyPlant, description: PandaDescription, X_WC: NDArray[np.float64] | None = None
+) -> PandaParts:
     """Add the arm, standing on the table's level at the origin of W, with pusher and camera.
+
+    With `X_WC` [4, 4] the camera is fixed to the world there, and the arm must not touch it.
 
     Raises ValueError where an option names something that is not there.
     """
@@ -121,6 +129,9 @@ def add_panda(plant: MultibodyPlant, description: PandaDescription) -> PandaPart
     )
     _set_limits(plant, arm, description.limits)
     tip_frame = plant.GetFrameByName("tip", pusher)
+    if X_WC is not None:
+        camera_frame = _add_fixed_camera(plant, RigidTransform(X_WC))
+        return PandaParts(arm=arm, pusher=pusher, tip_frame=tip_frame, camera_frame=camera_frame)
     camera_frame = plant.GetFrameByName("camera", pusher)
     if description.X_EC:
         if len(description.X_EC) != 6:
@@ -130,6 +141,15 @@ def add_panda(plant: MultibodyPlant, description: PandaDescription) -> PandaPart
         X_EC = RigidTransform(RollPitchYaw(description.X_EC[3:]), description.X_EC[:3])
         camera_frame = plant.AddFrame(FixedOffsetFrame("calibrated_camera", tip_frame, X_EC, pusher))
     return PandaParts(arm=arm, pusher=pusher, tip_frame=tip_frame, camera_frame=camera_frame)
+
+
+def _add_fixed_camera(plant: MultibodyPlant, X_WC: RigidTransform) -> Frame:
+    """A camera on a stand, as a box behind its lens; what holds it is not known here."""
+    X_WBox = X_WC @ RigidTransform([0, 0, -CAMERA_BOX[2] / 2 - 0.002])
+    world, box, name = plant.world_body(), Box(*CAMERA_BOX), "fixed_camera"
+    plant.RegisterCollisionGeometry(world, X_WBox, box, name, CoulombFriction(1.0, 1.0))
+    plant.RegisterVisualGeometry(world, X_WBox, box, name, np.array([0.72, 0.73, 0.75, 1.0]))
+    return plant.AddFrame(FixedOffsetFrame(name, plant.world_frame(), X_WC))
 
 
 def _set_limits(plant: MultibodyPlant, arm: ModelInstanceIndex, limits: RobotLimits) -> None:

@@ -12,6 +12,7 @@ from pydrake.planning import RobotDiagramBuilder
 
 from riseg_drake.robot.description import PandaDescription, add_panda
 from riseg_drake.robot.inverse import panda_postures
+from riseg_drake.robot.out_of_view import posture_out_of_view
 
 LIMIT_MARGIN = 0.05
 """Room that solutions keep to the ends of the joints' ranges, rad."""
@@ -39,13 +40,14 @@ def tip_pointing_down(p_WE: Sequence[float] | NDArray, yaw: float) -> NDArray[np
 class PandaKinematics:
     """The arm with its tool, alone above the table z = 0. Not for use by several threads at once."""
 
-    def __init__(self, description: PandaDescription | None = None):
+    def __init__(self, description: PandaDescription | None = None, X_WC: NDArray | None = None):
+        """With X_WC [4, 4] the camera is fixed to the world there; without, it is on the tool."""
         description = description or PandaDescription()
         self.limits = description.limits
         """What the robot's joints can do."""
         builder = RobotDiagramBuilder(time_step=0.0)
         self.plant = builder.plant()
-        self.parts = add_panda(self.plant, description)
+        self.parts = add_panda(self.plant, description, X_WC)
         table = self.plant.RegisterCollisionGeometry(
             self.plant.world_body(),
             RigidTransform([0, 0, -_TABLE_SIZE[2] / 2]),
@@ -64,8 +66,10 @@ class PandaKinematics:
         self._root = self._diagram.CreateDefaultContext()
         self._context = self._diagram.mutable_plant_context(self._root)
         self._flange = self.plant.GetFrameByName("panda_link8", self.parts.arm)
+        self.fixed_camera = X_WC
+        """X_WC [4, 4] of a camera fixed to the world; None: it moves with the tool."""
         self.X_EC = self.camera_frame.CalcPose(self._context, self.tip_frame).GetAsMatrix4()
-        """Pose of the camera on the tool, [4, 4]."""
+        """Pose of the camera on the tool, [4, 4]; of no meaning where it is fixed to the world."""
         self.X_EF = self._flange.CalcPose(self._context, self.tip_frame).GetAsMatrix4()
         """Pose of the flange (panda_link8) seen from the tip, [4, 4]."""
 
@@ -220,7 +224,8 @@ def observation_posture(
 ) -> NDArray[np.float64]:
     """Joint angles [7], rad, to look from: those given, or looking at a point of the table.
 
-    Where the view leans, the camera looks from that side of the point where the arm has most room to move.
+    Where the camera is fixed to the world, the arm waits out of its view of that point, and height and pitch
+    are of no account. Where the view leans, the camera looks from that side of the point where the arm has most room to move.
 
     Args:
         kinematics: of the arm.
@@ -236,6 +241,8 @@ def observation_posture(
         if len(given) != 7:
             raise ValueError(f"start_position: {len(given)} angles; expected 7, in rad")
         return np.array(given, np.float64)
+    if kinematics.fixed_camera is not None:
+        return posture_out_of_view(kinematics, centre_W)
     p_WT = [*centre_W, 0.0]
     if pitch:
         q = _roomiest(kinematics, p_WT, height, abs(pitch))

@@ -30,6 +30,7 @@ from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.limits import check_start_position
 from riseg_drake.stations.arm_messages import AHEAD
 from riseg_drake.stations.arm_view import add_arm_view
+from riseg_drake.stations.camera_mount import CameraMount
 from riseg_drake.stations.lcm_channels import LcmConfig
 from riseg_drake.stations.lcm_images import ImageError, LcmImages, decode_images
 from riseg_drake.stations.lcm_reception import Reception
@@ -43,7 +44,7 @@ TARGET_PERIOD = 0.01
 
 
 @dataclass
-class HardwareCameraConfig:
+class HardwareCameraConfig(CameraMount):
     """The RealSense camera, as its driver was started."""
 
     width: int = field(default=640, metadata={"least": 0, "most": 16384})
@@ -73,6 +74,7 @@ class HardwareCameraConfig:
 
     def check(self) -> None:
         """Raise ValueError for a camera that cannot be."""
+        self.check_mount()
         check_camera(self.cx, self.cy, self.full_width, self.full_height, self.depth_min, self.depth_max)
         if self.width > self.full_width:
             raise ValueError(f"width is {self.width}; at most full_width, {self.full_width} px")

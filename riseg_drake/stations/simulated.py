@@ -132,7 +132,7 @@ def add_world(
     `objects` replaces the scene that `config.scene` would draw from the seed. Raises ValueError.
     """
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, step)
-    panda = add_panda(plant, config.panda)
+    panda = add_panda(plant, config.panda, config.camera.fixed_pose)
     for body in plant.GetBodyIndices(panda.pusher):
         pushing = plant.GetCollisionGeometriesForBody(plant.get_body(body))
         let_touch(plant, scene_graph, pushing, rigid=True)
@@ -244,7 +244,7 @@ def start_position(config: SimulatedStationConfig) -> list[float]:
     """Joint angles at the start, rad [7]. Raises ValueError where the arm cannot look from there."""
     return list(
         observation_posture(
-            PandaKinematics(config.panda),
+            PandaKinematics(config.panda, config.camera.fixed_pose),
             config.scene.centre_W,
             config.observe_height,
             config.start_position,

@@ -11,11 +11,12 @@ from pydrake.systems.sensors import ImageDepth32F, ImageLabel16I, ImageRgba8U
 
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import sanitize_depth
+from riseg_drake.stations.camera_mount import CameraMount
 from riseg_drake.stations.sensor_noise import SensorNoise, Sight, noisy_color, noisy_depth
 
 
 @dataclass
-class CameraConfig:
+class CameraConfig(CameraMount):
     """A D415's colour camera, 848x480 cropped to its central 640x480, with depth aligned to it."""
 
     width: int = field(default=640, metadata={"least": 16, "most": 16384})
@@ -45,6 +46,7 @@ class CameraConfig:
 
     def check(self) -> None:
         """Raise ValueError for a camera that cannot be."""
+        self.check_mount()
         check_camera(self.cx, self.cy, self.width, self.height, self.depth_min, self.depth_max)
 
     @property

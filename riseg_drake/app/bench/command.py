@@ -94,7 +94,7 @@ def segment_once(scenario: Scenario, images: Sequence[StationOutputs]) -> None:
 def _segment(scenario: Scenario, images: Sequence[StationOutputs], clock: StageClock) -> None:
     """Put the images through Alg. 2, one tick of the camera each, and book every stage and the whole."""
     period = 1 / scenario.station.camera.rate
-    view = panda_view(scenario, PandaKinematics(scenario.station.panda))
+    view = panda_view(scenario, PandaKinematics(scenario.station.panda, scenario.station.camera.fixed_pose))
     diagram, stages = make_segmentation(scenario, view, period, seed=0)
     after_each = put_through(diagram, images, period)
     next(after_each)  # the first frame has no partner, and fills what is computed once for all

@@ -71,7 +71,9 @@ def _frame_times(
     """Wall time of every frame but the first, s; the model begins anew whenever it is done."""
     period = 1 / scenario.station.camera.rate
     builder = DiagramBuilder()
-    block = add_segmentation(builder, scenario, PandaKinematics(scenario.station.panda), seed=0)
+    block = add_segmentation(
+        builder, scenario, PandaKinematics(scenario.station.panda, scenario.station.camera.fixed_pose), seed=0
+    )
     refiner = builder.AddSystem(MaskRefiner(model or _nothing, period, REFINER_OFFSET))
     for name in ("pair", "mask"):
         builder.Connect(block.outputs[name], refiner.GetInputPort(name))

@@ -88,7 +88,7 @@ def ablate(scenario: Scenario, seed: int, recording: Path, times: Sequence[float
     Raises:
         RecordingError: a frame of these times, or its true labels, are missing.
     """
-    kinematics = PandaKinematics(scenario.station.panda)
+    kinematics = PandaKinematics(scenario.station.panda, scenario.station.camera.fixed_pose)
     replays = {
         name: Replay(switched(scenario, switch), panda_view(scenario, kinematics), seed)
         for name, switch in versions().items()

@@ -39,7 +39,7 @@ class ObservationView:
 
     def __init__(self, scenario: Scenario):
         self._intrinsics = scenario.simulated.camera.intrinsics
-        kinematics = PandaKinematics(scenario.simulated.panda)
+        kinematics = PandaKinematics(scenario.simulated.panda, scenario.simulated.camera.fixed_pose)
         q = np.array(start_position(scenario.simulated))
         self._X_WC = kinematics.X_WC(q)
         self._robot = RobotSilhouette(kinematics, self._intrinsics).mask(q)

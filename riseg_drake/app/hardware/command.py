@@ -162,7 +162,7 @@ class _Session:
 
     def run(self, record: bool) -> None:
         """Move the arm. Raises RunStoppedError if it was stopped for good."""
-        kinematics = PandaKinematics(self._config.panda)
+        kinematics = PandaKinematics(self._config.panda, self._config.camera.fixed_pose)
         q_observe = self._observation_posture(kinematics)
         with ExitStack() as stack:
             commands = stack.enter_context(

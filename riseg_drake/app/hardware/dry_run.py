@@ -29,7 +29,7 @@ class DryRun:
         progress: Progress,
     ):
         """`operator` None: nobody is asked. Why it ends is entered in `progress`."""
-        self._kinematics = PandaKinematics(scenario.hardware.panda)
+        self._kinematics = PandaKinematics(scenario.hardware.panda, scenario.hardware.camera.fixed_pose)
         self._most = scenario.arm.most_interactions
         self._planned, self._operator, self._console = planned, operator, console
         self._progress = progress

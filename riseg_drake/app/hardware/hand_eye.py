@@ -44,7 +44,7 @@ def hand_eye_command(
     scenario = load_scenario(scenario_file, HARDWARE)
     config = scenario.hardware
     check_limits(scenario)
-    kinematics = PandaKinematics(config.panda)
+    kinematics = PandaKinematics(config.panda, config.camera.fixed_pose)
     postures = _postures(kinematics, config)
     path = output or Path("out") / "hand_eye"
     with (

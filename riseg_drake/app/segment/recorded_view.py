@@ -122,4 +122,4 @@ def _kinematics(
             f"{reader.joints.path}: line {reader.joints.lines[0]} holds {number} joint angles, the Panda has "
             f"{PANDA_JOINTS}; name your own robot with --robot and --camera-frame"
         )
-    return PandaKinematics(scenario.station.panda)
+    return PandaKinematics(scenario.station.panda, scenario.station.camera.fixed_pose)
