@@ -102,7 +102,7 @@ EXECUTED: dict[str, tuple[Callable[[list[str]], list[str] | None], str]] = {
     "hardware": (lambda words: None, "needs the drivers; tests/app/test_emulate.py runs it on emulated ones"),
     "drive-arm": (
         lambda words: None,
-        "needs a robot; tests/stations/test_franka_link.py drives one that others wrote",
+        "needs a robot; tests/stations/test_drive_process.py drives one that others wrote",
     ),
     "drive-camera": (
         lambda words: None,
