@@ -23,6 +23,10 @@ before with the joint angles of now, and earlier than the simulation's next step
 MASK_OFFSET = 0.0006
 """L_t is made this long after the camera's tick, s: once the frame is in memory."""
 
+FIXED_MARGIN_M, FIXED_MARGIN_PX = 0.003, 3.0
+"""Before a camera that is fixed to the world the arm is drawn broader by so much, m on it and pixels: it moves
+across the picture, all of its joints err, and flow smears its motion over its edge."""
+
 STATION_PORTS = {
     "color_image": "wrist.color_image",
     "depth_image": "wrist.depth_image",
@@ -45,9 +49,13 @@ class SegmentationBlock:
 
 
 def panda_view(scenario: Scenario, kinematics: PandaKinematics) -> FrameView:
-    """What the scenario's camera on the arm sees: its pose and the robot's pixels follow from theta."""
+    """What the scenario's camera sees: its pose and the robot's pixels follow from theta."""
     intrinsics = scenario.station.camera.intrinsics
-    return FrameView(intrinsics, kinematics.X_WC, RobotSilhouette(kinematics, intrinsics).mask)
+    if kinematics.fixed_camera is None:
+        silhouette = RobotSilhouette(kinematics, intrinsics)
+    else:
+        silhouette = RobotSilhouette(kinematics, intrinsics, FIXED_MARGIN_M, FIXED_MARGIN_PX)
+    return FrameView(intrinsics, kinematics.X_WC, silhouette.mask)
 
 
 def add_segmentation(

@@ -225,8 +225,8 @@ def observation_posture(
     """Joint angles [7], rad, to look from: those given, or looking at a point of the table.
 
     Where the camera is fixed to the world, the arm waits out of its view of that point, and height and pitch
-    are of no account. Where the view leans, the camera looks from that side of the point where the arm has most
-    room to move.
+    are of no account. Where the view leans, the camera looks from that side of the point where the arm has
+    most room to move.
 
     Args:
         kinematics: of the arm.

@@ -61,7 +61,7 @@ def test_the_arm_must_not_touch_the_camera():
     X_WE = tip_pointing_down(p_WE, 0.0)
     free = PandaKinematics(PandaDescription(), IN_FRONT)
     q = free.solve_ik(X_WE)
-    near = looking(p_WE + np.array([0.03, 0, 0.1]), p_WE - np.array([0.1, 0, 0.1]))
+    near = looking(p_WE + np.array([0.03, 0, 0.1]), p_WE - [0.1, 0, 0.1])
     assert free.clearance(q) > 0.01
     assert PandaKinematics(PandaDescription(), near).clearance(q) < 0
 

@@ -15,9 +15,10 @@ from pydrake.planning import RobotDiagramBuilder
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
 from scipy.spatial import ConvexHull
 
+from riseg_drake.app.segmentation_block import FIXED_MARGIN_M, FIXED_MARGIN_PX
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.robot.description import PandaDescription, add_panda
-from riseg_drake.robot.kinematics import observe_pose, tip_pointing_down
+from riseg_drake.robot.kinematics import READY, PandaKinematics, observe_pose, tip_pointing_down
 from riseg_drake.robot.silhouette import NEAR, RobotSilhouette, UnknownShapeError, hull_corners
 
 D415 = Intrinsics(640, 480, 616.285, 615.778, 301.418, 232.864)
@@ -26,9 +27,14 @@ D415 = Intrinsics(640, 480, 616.285, 615.778, 301.418, 232.864)
 @pytest.fixture(scope="module")
 def rendered_robot():
     """A function q -> bool [H, W]: where Drake's label image shows the robot."""
+    return renderer_of_robot()
+
+
+def renderer_of_robot(X_WC=None):
+    """The same, for a camera fixed to the world at X_WC."""
     builder = RobotDiagramBuilder(time_step=0.0)
     plant, scene_graph = builder.plant(), builder.scene_graph()
-    frame = add_panda(plant, PandaDescription()).camera_frame
+    frame = add_panda(plant, PandaDescription(), X_WC).camera_frame
     plant.Finalize()
     scene_graph.AddRenderer("vtk", MakeRenderEngineVtk(RenderEngineVtkParams()))
     k = D415
@@ -83,6 +89,24 @@ def test_with_margin_the_silhouette_covers_every_rendered_pixel_and_little_else(
         drawn, true = silhouette.mask(q), rendered_robot(q)
         assert (drawn & true).sum() == true.sum()
         assert (drawn & true).sum() / (drawn | true).sum() > 0.75
+
+
+@pytest.mark.renders
+def test_a_fixed_camera_sees_the_whole_arm_and_every_link_of_it_is_drawn():
+    # 2 m ahead of the base, at 0.5 m, looking back at the arm: x is W's y, y points down.
+    X_WC = np.array([[0, 0, -1, 2.0], [1, 0, 0, 0], [0, -1, 0, 0.5], [0, 0, 0, 1]])
+    fixed, rendered = PandaKinematics(PandaDescription(), X_WC), renderer_of_robot(X_WC)
+    for q in (
+        READY,
+        READY + np.array([0.8, 0.3, -0.5, 0.4, 1.0, -0.5, 0.7]),
+        np.array([0, 0.9, 0, -1.0, 0, 1.9, 0]),
+    ):
+        drawn, true = RobotSilhouette(fixed, D415, 0.0, 0.0).mask(q), rendered(q)
+        assert true.sum() > 10_000
+        assert (drawn & true).sum() / (drawn | true).sum() > 0.96
+        widely = RobotSilhouette(fixed, D415, FIXED_MARGIN_M, FIXED_MARGIN_PX).mask(q)
+        assert (widely & true).sum() == true.sum()
+        assert (widely & true).sum() / widely.sum() > 0.7
 
 
 def test_the_pusher_enters_only_at_the_lower_edge_and_hides_nothing_that_it_pushes(panda):

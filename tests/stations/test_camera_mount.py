@@ -1,8 +1,11 @@
 import numpy as np
 import pytest
+from pydrake.systems.analysis import Simulator
 
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.scenario_file import ScenarioError, parse_scenario
+from riseg_drake.stations.emulated_camera import FULL_WIDTH, EmulatedCamera
+from riseg_drake.stations.simulated import SimulatedStation
 
 STATIONS = ("", " !HardwareStationConfig")
 
@@ -43,3 +46,24 @@ def test_what_cannot_be_is_refused_in_one_line(lines, said, station):
     with pytest.raises(ScenarioError, match=said) as refused:
         camera_of(lines, station)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.renders
+def test_simulation_and_emulator_see_from_where_the_camera_is_fixed_however_the_arm_stands():
+    config = Scenario().simulated
+    # Straight above (0.5, 0.3), where no thing lies, turned so that the image's right is W's y.
+    config.camera.mount, config.camera.X_WC = "world", [0.5, 0.3, 0.6, np.pi, 0.0, np.pi / 2]
+    config.camera.noise.disparity_std = 0.0
+    v, u = round(config.camera.cy), round(config.camera.cx)
+    station = SimulatedStation(config, seed=3)
+    context = station.CreateDefaultContext()
+    Simulator(station, context).Initialize()
+    depth = station.GetOutputPort("wrist.depth_image").Eval(context).data[..., 0]
+    assert depth[v, u] == pytest.approx(0.6, abs=2e-3)
+    emulated = EmulatedCamera(config, seed=3)
+    shift = (FULL_WIDTH - config.camera.width) // 2
+    for q in (np.zeros(7), np.array([0.5, -0.3, 0, -2, 0, 1.7, 0])):
+        positions = emulated._plant.GetPositions(emulated._plant_context)
+        positions[:7] = q
+        emulated.look(positions)
+        assert emulated.picture(0).depth[v, u + shift] == pytest.approx(0.6, abs=2e-3)

@@ -1,5 +1,10 @@
-"""`riseg hand-eye`: is the camera where the scenario says? The arm moves over a scene that stands still."""
+"""`riseg hand-eye`: is the camera where the scenario says? The arm moves over a scene that stands still.
 
+A camera on the wrist is judged by what it sees of that scene, one that is fixed to the world by what it sees of
+the arm.
+"""
+
+import time
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -24,15 +29,22 @@ from riseg_drake.recording.whole_file import write_png
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture, tip_pointing_down
 from riseg_drake.robot.silhouette import RobotSilhouette
 from riseg_drake.segmentation.above_table import objects_above_table
-from riseg_drake.segmentation.hand_eye import FlowError, draw_flow_error, flow_errors, verdict
+from riseg_drake.segmentation.hand_eye import draw_flow_error, flow_errors, verdict
+from riseg_drake.segmentation.outline_error import draw_outline_error, outline_errors, outline_verdict
 from riseg_drake.stations.command_process import CommandProcess
 from riseg_drake.stations.hardware import HardwareCameraConfig, HardwareStationConfig, newest_sight
 from riseg_drake.stations.lcm_reception import Reception
 
-PARTS = r"flow_\d+\.png"
+PARTS = r"(flow|outline)_\d+\.png"
 """What the check puts into its folder, beside the summary."""
 OFFSETS = ((0.04, 0.0, 0.0), (0.0, 0.04, 0.1), (-0.04, 0.0, 0.0), (0.0, -0.04, -0.1), (0.0, 0.0, 0.0))
 """Where the tip goes from the observation posture, x and y in W, m, and by how much it turns, rad."""
+IN_VIEW = ((0.0, 0.0, 0.0), (0.05, 0.12, 0.5), (0.05, -0.12, -0.5), (-0.08, 0.0, 0.0))
+"""Before a fixed camera the tip goes there from the middle of the work area, likewise ..."""
+HEIGHT_IN_VIEW = 0.1
+"""... this high above the table, m."""
+LONGEST_WAIT = 5.0
+"""For a picture, s."""
 SLOWER = 0.3
 """The arm moves at this share of the speed of other planned motions."""
 
@@ -45,44 +57,81 @@ def hand_eye_command(
     config = scenario.hardware
     check_limits(scenario)
     kinematics = PandaKinematics(config.panda, config.camera.fixed_pose)
-    postures = _postures(kinematics, config)
+    is_fixed = kinematics.fixed_camera is not None
+    postures = (_postures_in_view if is_fixed else _postures)(kinematics, config)
     path = output or Path("out") / "hand_eye"
     with (
         OutputFolder(path, "hand-eye", PARTS, {"state": "running"}, overwrite=overwrite) as folder,
         end_noted(lambda state, end: folder.note(state=state, end=end), lambda: f"no verdict in {folder.path}"),
     ):
         frames = _watched_moves(scenario, kinematics, postures, TerminalOperator(console, yes), console)
-        errors = flow_errors(frames)
-        if not errors:
-            raise HardwareError(
-                f"{len(frames)} pictures came, with too little texture or depth in them to compare; "
-                "put patterned things on the table"
-            )
+        if is_fixed:
+            told, drawn, name = _outlines_told(frames, console)
+            how_drawn = "outlines of the arm in {}: drawn broad and blue, seen orange upon it"
+        else:
+            told, drawn, name = _flows_told(frames, console)
+            how_drawn = "arrows of both flows in {}: expected broad and blue, observed orange upon it"
         with folder.writing():
-            for index, error in enumerate(errors[:: max(len(errors) // 5, 1)]):
-                write_png(folder.path / f"flow_{index}.png", draw_flow_error(error))
-        plane_W = objects_above_table(frames[-1], scenario.above_table).plane_W
-        folder.note(state="done", **_told(errors, plane_W, console))
-    console.print(f"arrows of both flows in {folder.path}: expected broad and blue, observed orange upon it")
+            for index, picture in enumerate(drawn):
+                write_png(folder.path / f"{name}_{index}.png", picture)
+        # A fixed camera sees the table without the arm in the first picture.
+        plane_W = objects_above_table(frames[0 if is_fixed else -1], scenario.above_table).plane_W
+        folder.note(state="done", **told, **_table_told(plane_W, console))
+    console.print(how_drawn.format(folder.path))
 
 
-def _told(errors: Sequence[FlowError], plane_W: NDArray, console: Console) -> dict[str, Any]:
-    """Say what the flows and the table's plane [4] in the arm's frame show; returns it as figures."""
+def _flows_told(frames: Sequence[Frame], console: Console) -> tuple[dict[str, Any], list[NDArray], str]:
+    """Say what the flows show; returns that as figures, and some of them drawn. Raises HardwareError."""
+    errors = flow_errors(frames)
+    if not errors:
+        raise HardwareError(
+            f"{len(frames)} pictures came, with too little texture or depth in them to compare; "
+            "put patterned things on the table"
+        )
     median, words = verdict(errors)
     shift_u, shift_v = np.median([error.mean for error in errors], axis=0)
-    tilt = np.degrees(np.arccos(np.clip(plane_W[2], -1, 1)))
     console.print(
         f"hand-eye: observed and expected flow differ by {median:.2f} pixels (median of {len(errors)} pairs; "
         f"shared by all pixels: {shift_u:+.2f}, {shift_v:+.2f}): {words}"
     )
+    figures = {
+        "pairs": len(errors),
+        "median_px": round(median, 3),
+        "shift_px": [round(float(shift_u), 3), round(float(shift_v), 3)],
+    }
+    return figures, [draw_flow_error(error) for error in errors[:: max(len(errors) // 5, 1)]], "flow"
+
+
+def _outlines_told(frames: Sequence[Frame], console: Console) -> tuple[dict[str, Any], list[NDArray], str]:
+    """The same of the arm's outlines before a fixed camera; the first frame shows the scene without it."""
+    errors = outline_errors(frames)
+    if not errors:
+        raise HardwareError(
+            f"{len(frames)} pictures came, and the arm stands out in none by its depth; X_WC may be far off, "
+            "or the camera see no depth there"
+        )
+    median, words = outline_verdict(errors)
+    shift_u, shift_v = np.median([error.shift for error in errors], axis=0)
+    console.print(
+        f"hand-eye: the arm is seen {median:.1f} pixels from where it is drawn (median of {len(errors)} "
+        f"pictures; shared by all: {shift_u:+.1f}, {shift_v:+.1f}): {words}"
+    )
+    figures = {
+        "pictures": len(errors),
+        "median_px": round(median, 2),
+        "shift_px": [round(float(shift_u), 2), round(float(shift_v), 2)],
+    }
+    return figures, [draw_outline_error(error) for error in errors[:: max(len(errors) // 5, 1)]], "outline"
+
+
+def _table_told(plane_W: NDArray, console: Console) -> dict[str, Any]:
+    """Say where the table's plane [4] lies in the arm's frame; returns it as figures."""
+    tilt = np.degrees(np.arccos(np.clip(plane_W[2], -1, 1)))
     console.print(
         f"table: {-1e3 * plane_W[3]:.1f} mm high and tilted by {tilt:.2f} degrees in the arm's base frame; "
         "both should be near 0"
     )
     return {
-        "pairs": len(errors),
-        "median_px": round(median, 3),
-        "shift_px": [round(float(shift_u), 3), round(float(shift_v), 3)],
         "table_height_mm": round(-1e3 * float(plane_W[3]), 2),
         "table_tilt_deg": round(float(tilt), 3),
     }
@@ -102,11 +151,17 @@ def _watched_moves(
             wait_for_drivers(reception, config, ready=True, say=status.update)
         camera = _Collector(reception, config.camera, kinematics)
         with CommandProcess(config.lcm, config.command, config.panda) as commands:
-            operator.confirm("the arm goes to where it looks from, and 4 cm around; nothing else may move")
+            operator.confirm(
+                "the arm goes to where it looks from, and 4 cm around; nothing else may move"
+                if kinematics.fixed_camera is None
+                else "the arm shows itself before the camera, the tip 10 cm above the table; clear it"
+            )
             for index, q in enumerate(postures):
                 # The way there is not of interest; the moves after it are slow, for enough pictures.
                 plan = partial(_move, kinematics, q, limits, SLOWER if index else 1.0)
                 travel(plan, commands, reception, operator, camera.look if index else lambda: None)
+                if index == 0:
+                    camera.wait(reception)
     return camera.frames
 
 
@@ -115,9 +170,20 @@ class _Collector:
 
     def __init__(self, reception: Reception, config: HardwareCameraConfig, kinematics: PandaKinematics):
         self._reception, self._config, self._kinematics = reception, config, kinematics
-        self._silhouette = RobotSilhouette(kinematics, config.intrinsics)
+        # Of flow what is near the arm is left out, too; an outline that is to be compared must have no margin.
+        margins = (0.001, 1.0) if kinematics.fixed_camera is None else (0.0, 0.0)
+        self._silhouette = RobotSilhouette(kinematics, config.intrinsics, *margins)
         self._newest = reception.clock()
         self.frames: list[Frame] = []
+
+    def wait(self, reception: Reception) -> None:
+        """Take in a picture that is taken from now on. Raises HardwareError where none comes."""
+        self._newest, until, count = reception.clock(), reception.clock() + LONGEST_WAIT, len(self.frames)
+        while len(self.frames) == count:
+            if reception.clock() > until:
+                raise HardwareError(f"no picture that can be used came for {LONGEST_WAIT:g} s")
+            time.sleep(0.02)
+            self.look()
 
     def look(self) -> None:
         """Take in the newest picture, if there is another."""
@@ -168,4 +234,20 @@ def _postures(kinematics: PandaKinematics, config: HardwareStationConfig) -> lis
         if traced is None:
             raise ScenarioError("centre_W, observe_height: the arm cannot move by 4 cm there")
         postures.append(traced[-1])
+    return postures
+
+
+def _postures_in_view(kinematics: PandaKinematics, config: HardwareStationConfig) -> list[np.ndarray]:
+    """Where the arm waits, and then postures before the fixed camera."""
+    try:
+        q = observation_posture(kinematics, config.centre_W, config.observe_height, config.start_position)
+    except ValueError as error:
+        raise ScenarioError(str(error)) from None
+    postures = [q]
+    for x, y, turn in IN_VIEW:
+        p_WE = [config.centre_W[0] + x, config.centre_W[1] + y, HEIGHT_IN_VIEW]
+        shown = kinematics.solve_ik(tip_pointing_down(p_WE, turn), postures[-1], min_clearance=0.02)
+        if shown is None:
+            raise ScenarioError("centre_W: the arm cannot move there with 2 cm to table and camera")
+        postures.append(shown)
     return postures

@@ -3,14 +3,20 @@ import json
 import numpy as np
 import pytest
 from pydrake.lcm import DrakeLcm
+from rich.console import Console
 
 from riseg_drake.app.cli import main
 from riseg_drake.app.hardware.drivers import HardwareError
-from riseg_drake.app.hardware.hand_eye import _Collector, _postures
+from riseg_drake.app.hardware.hand_eye import _Collector, _outlines_told, _postures, _postures_in_view
 from riseg_drake.app.output_folder import SUMMARY
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.app.work_state import RunStoppedError
-from riseg_drake.robot.kinematics import READY, PandaKinematics
+from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.geometry.se3 import exp_se3
+from riseg_drake.robot.description import PandaDescription
+from riseg_drake.robot.kinematics import READY, PandaKinematics, observation_posture
+from riseg_drake.robot.silhouette import RobotSilhouette
+from riseg_drake.segmentation.outline_error import LEAST
 from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.ideal_arm import status_message
 from riseg_drake.stations.lcm_images import encode_images
@@ -82,3 +88,49 @@ def test_where_no_two_pictures_can_be_compared_the_check_has_failed(tmp_path, mo
     assert main(["hand-eye", str(scenario), "--yes", "--output", str(out)]) == 2
     assert "put patterned things on the table" in capsys.readouterr().err
     assert json.loads((out / SUMMARY).read_text())["state"] == "failed"
+
+
+IN_FRONT = [1.0303, 0.0, 0.5503, -2.3562, 0.0, 1.5708]
+
+
+@pytest.fixture(scope="module")
+def watched():
+    """Station, arm and postures [7] of the check before a fixed camera, the first out of its view."""
+    config = load_scenario(None, HARDWARE).hardware
+    config.camera.mount, config.camera.X_WC = "world", IN_FRONT
+    kinematics = PandaKinematics(config.panda, config.camera.fixed_pose)
+    return config, kinematics, _postures_in_view(kinematics, config)
+
+
+def test_before_a_fixed_camera_the_arm_shows_itself_over_the_work_area(watched):
+    config, kinematics, (waiting, *shown) = watched
+    np.testing.assert_array_equal(waiting, observation_posture(kinematics, config.centre_W, 0.5))
+    tips = np.array([kinematics.X_WE(q)[:3, 3] for q in shown])
+    expected = [[0.5, 0, 0.1], [0.55, 0.12, 0.1], [0.55, -0.12, 0.1], [0.42, 0, 0.1]]
+    np.testing.assert_allclose(tips, expected, atol=1e-9)
+    silhouette = RobotSilhouette(kinematics, config.camera.intrinsics)
+    base = silhouette.mask(waiting)  # which is in the picture, too
+    for q in shown:
+        assert np.count_nonzero(silhouette.mask(q) & ~base) > 1.5 * LEAST * base.size
+
+
+def seen_from(kinematics, X_WC, q, intrinsics):
+    """A picture of the arm 0.3 m before a wall, from where the camera really is, drawn by `kinematics`."""
+    really = PandaKinematics(PandaDescription(), X_WC)
+    depth = np.where(RobotSilhouette(really, intrinsics, 0, 0).mask(q), 0.7, 1.0).astype(np.float32)
+    color = np.full((*intrinsics.shape, 3), 90, np.uint8)
+    drawn = RobotSilhouette(kinematics, intrinsics, 0, 0).mask(q)
+    return Frame(0, 0.0, intrinsics, color, depth, kinematics.X_WC(q), drawn)
+
+
+@pytest.mark.parametrize(("turned", "words"), [(0.0, "good"), (0.005, "usable"), (0.02, "bad")])
+def test_a_fixed_camera_that_is_turned_is_found_out_by_the_arms_outline(turned, words, capsys, watched):
+    config, kinematics, postures = watched
+    # About the camera's y axis: to the right the arm is seen further left, by f tan(angle).
+    X_WC = kinematics.fixed_camera @ exp_se3(np.array([0, turned, 0, 0, 0, 0]))
+    frames = [seen_from(kinematics, X_WC, q, config.camera.intrinsics) for q in postures]
+    told, drawn, name = _outlines_told(frames, Console())
+    assert name == "outline"
+    assert len(drawn) == told["pictures"] == 4
+    assert told["shift_px"][0] == pytest.approx(-config.camera.fx * np.tan(turned), abs=0.8)
+    assert f"): {words}" in " ".join(capsys.readouterr().out.split())
