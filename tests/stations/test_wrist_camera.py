@@ -21,7 +21,9 @@ NONE = SensorNoise(enabled=False)
 
 
 def config(**changed):
-    return CameraConfig(*SIZE, 40.0, 41.0, 15.5, 11.5, **{"noise": NONE, **changed})
+    width, height = SIZE
+    given = {"width": width, "height": height, "fx": 40.0, "fy": 41.0, "cx": 15.5, "cy": 11.5, "noise": NONE}
+    return CameraConfig(**{**given, **changed})
 
 
 def color_of(value):

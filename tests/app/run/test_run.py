@@ -96,7 +96,7 @@ def test_the_frame_that_is_exported_is_the_last_one_that_was_recorded_with_its_m
         np.testing.assert_array_equal(data["rgb"], read(last))
         np.testing.assert_array_equal(data["segmap"], read(finished / "step_1" / "mask.png"))
     ids = np.unique(read(finished / "step_1" / "mask.png")).tolist()[1:]
-    assert {f"object_{a}.txt" for a in ids} == {p.name for p in (finished / "export" / "motions").iterdir()}
+    assert {f"object_{a}.txt" for a in ids} == {p.name for p in (finished / "export" / "poses").iterdir()}
     assert summary(finished)["exports"] == ["npz", "poses"]
 
 
