@@ -69,9 +69,8 @@ def drive_arm_command(request: DriveRequest, console: Console) -> None:
     with _ended_by_signals(process):
         be_prompt(PRIORITY)
         process.run()
-    if process.cycles:
-        p50, p999 = 1e3 * np.percentile(process.cycles, [50, 99.9])
-        console.print(f"drive-arm: work of a cycle {p50:.2f} ms (median), {p999:.2f} ms (99.9 % are shorter)")
+    if process.cycles.count:
+        console.print(f"drive-arm: work of a cycle {process.cycles.told()}")
 
 
 class _ended_by_signals:  # noqa: N801 - is read as a context manager
