@@ -20,13 +20,13 @@ class CycleTimes:
         self.longest = 0.0
 
     def add(self, seconds: float) -> None:
-        """One more took so long."""
+        """One more took so long, s."""
         self._bins[min(int(seconds / RESOLUTION), len(self._bins) - 1)] += 1
         self.count += 1
         self.longest = max(self.longest, seconds)
 
     def percentile(self, percent: float) -> float:
-        """The least time, s, in whole RESOLUTION upwards, that so many in a hundred did not exceed; 0 of none."""
+        """The time, s, that so many in a hundred did not exceed, up to RESOLUTION more; 0 of none."""
         passed = 0
         for index, number in enumerate(self._bins):
             passed += number

@@ -4,7 +4,7 @@ from drake import lcmt_drake_signal
 
 
 def reasons_message(state: str, reasons: list[str], now: float) -> lcmt_drake_signal:
-    """What the driver does, and why, by the names of errors where the robot has some; stamped in ms, now in s."""
+    """What the driver does at a time, s, and why, by the names of errors where the robot has some."""
     message = lcmt_drake_signal()
     message.timestamp = int(1e3 * now)
     message.coord = [state, *reasons]

@@ -66,7 +66,7 @@ class Reception:
         self.pictures = 0
         """How many have been let in."""
         self.driver_says = ""
-        """Why the arm takes no commands, by its driver, in a line; empty while it takes some or nothing is said."""
+        """Why the arm takes no commands, by its driver; empty while it takes some or nothing is said."""
         lcm.Subscribe(config.status_channel, self._take_status)
         lcm.Subscribe(config.errors_channel, self._take_reasons)
         lcm.Subscribe(config.image_channel, self._take_picture)

@@ -36,8 +36,8 @@ def told(cause: Cause) -> str:
     if cause is Cause.STATUS_OLD:
         return (
             f"{cause.value}; a driver that has ended must be started again: `riseg drive-arm`, or "
-            "drake-franka-driver with station.command.mode as its --control_mode (with another one it ends at the "
-            "first command)"
+            "drake-franka-driver with station.command.mode as its --control_mode (with another one it ends at "
+            "the first command)"
         )
     return cause.value
 

@@ -94,7 +94,7 @@ def test_what_the_driver_says_about_a_stop_is_part_of_the_question_and_of_the_en
     desk = Desk(monkeypatch, answer)
     desk.driver_says = "the robot takes no commands: joint_reflex"
     desk.look(Mode.STOPPED, Cause.REFLEX)
-    line = "the arm is stopped: the arm stopped by reflex; its driver says: the robot takes no commands: joint_reflex"
+    line = f"the arm is stopped: the arm stopped by reflex; its driver says: {desk.driver_says}"
     assert desk.told == [line]
     assert desk.progress.end == ("" if answer is None else line.replace("is stopped", "was stopped"))
 

@@ -239,7 +239,7 @@ def test_where_the_operator_does_not_want_it_the_first_way_ends_there_with_the_r
     first_way.deeds = [lambda: False]
     first_way.driver_says = "the robot takes no commands: joint_reflex"
     looks = iter(range(10**6))
-    with pytest.raises(TravelError, match="pushes against the arm .*; its driver says: .*: joint_reflex"):
+    with pytest.raises(TravelError, match=r"pushes against the arm .*; its driver says: .*: joint_reflex"):
         travel(
             plan_to_observe,
             first_way,
