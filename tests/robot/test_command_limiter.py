@@ -223,6 +223,30 @@ def test_towards_the_end_of_an_fr3s_range_joints_are_no_faster_than_they_may_be_
     assert heedless > 1.2 * CommandLimits().velocity
 
 
+@pytest.mark.parametrize("end", [-1, 1])
+def test_on_the_way_to_the_end_of_a_range_a_joint_is_as_slow_as_at_the_slower_of_both_places_but_not_still(end):
+    limiter, share = CommandLimiter(FR3_LIMITS.position_middle, FR3_LIMITS), CommandLimits().velocity
+    goal = FR3_LIMITS.position_middle.copy()
+    goal[0] += end * (FR3_LIMITS.position_upper[0] - goal[0] - 0.2)
+    goal[4] += end * (FR3_LIMITS.position_upper[4] - goal[4] - 0.002)
+    assert limiter._approach(still(goal)) is not None
+    # 0.2 rad from its end joint 1 may do sqrt(2 * 6 * 0.2) - 0.3 rad/s, joint 5 so near to it nothing.
+    towards = share * FR3_LIMITS.velocity
+    towards[[0, 4]] = share * (np.sqrt(2.4) - 0.3), 1e-3
+    away = share * FR3_LIMITS.velocity
+    lowest, highest = (-away, towards) if end > 0 else (-towards, away)
+    np.testing.assert_allclose(limiter._way.min_velocity, lowest)
+    np.testing.assert_allclose(limiter._way.max_velocity, highest)
+
+
+def test_where_no_way_to_a_target_is_found_the_stop_is_gone_on_with_and_that_is_told(monkeypatch):
+    limiter = in_fast_motion(PANDA_LIMITS)
+    expected = limiter._stop.at_time(PERIOD)[0]
+    monkeypatch.setattr(limiter, "_approach", lambda target: None)
+    np.testing.assert_array_equal(limiter.follow(still(READY + 0.5)), expected)
+    assert limiter.held_back
+
+
 @pytest.mark.parametrize(
     "wrong", [{"velocity": 0.0}, {"jerk": 1.5}, {"acceleration": 0.9, "stop_acceleration": 0.5}]
 )
