@@ -112,6 +112,35 @@ def test_the_longest_stop_is_no_longer_than_said(robot):
     assert longest * PERIOD > 0.05  # the test has seen real stops
 
 
+@pytest.mark.parametrize("robot", [PANDA_LIMITS, FR3_LIMITS], ids=["panda", "fr3"])
+def test_the_longest_stop_is_ruckigs_from_full_speed_and_full_acceleration_the_wrong_way(robot):
+    limits, limiter = CommandLimits(), CommandLimiter(READY, robot)
+    stop = limiter._stop_from(
+        READY, limits.velocity * robot.velocity, limits.acceleration * robot.acceleration, limiter._braking
+    )
+    assert limits.longest_stop(robot) == pytest.approx(stop.duration, abs=1e-9)
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize(("spare", "followed"), [(1e-5, True), (-1e-5, False)])
+def test_an_acceleration_is_not_gone_on_with_where_taking_it_back_would_gather_too_much_speed(
+    sign, spare, followed
+):
+    limits, joint = CommandLimits(), 3
+    limiter = CommandLimiter(PANDA_LIMITS.position_middle, PANDA_LIMITS)
+    a = 0.9 * limits.acceleration * PANDA_LIMITS.acceleration[joint]
+    # Taken back with the greatest jerk j it gathers a^2 / 2j.
+    gathered = a**2 / (2 * limits.jerk * PANDA_LIMITS.jerk[joint])
+    v = limits.velocity * PANDA_LIMITS.velocity[joint] - gathered - spare - PERIOD * a
+    limiter.velocity[joint], limiter.acceleration[joint] = sign * v, sign * a
+    free = Target(
+        limiter.position + PERIOD * limiter.velocity + PERIOD**2 / 2 * limiter.acceleration,
+        limiter.velocity + PERIOD * limiter.acceleration,
+        limiter.acceleration,
+    )
+    assert (limiter._follow_linearly(free) is not None) is followed
+
+
 def in_fast_motion(robot):
     limiter = CommandLimiter(READY, robot, PERIOD)
     goal = READY + np.array([0.5, -0.4, 0.3, 0.2, 0.5, 0.4, -0.5])

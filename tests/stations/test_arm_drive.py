@@ -170,6 +170,15 @@ def test_a_robot_that_stopped_is_told_as_it_is_and_recovered_at_a_word_that_came
     np.testing.assert_allclose(robot.tick().command, READY + 0.3 if mode == "position" else 0, atol=1e-12)
 
 
+@pytest.mark.parametrize(("age", "counts"), [(1.98, True), (2.02, False), (-0.09, True), (-0.11, False)])
+def test_a_word_counts_for_two_seconds_and_from_a_tenth_of_a_second_ahead(age, counts):
+    robot = DrivenRobot().swing(0.6)
+    robot.drive.lose(robot.now, "joint_reflex")
+    robot.robot_mode = REFLEX
+    robot.ticks += 3000
+    assert robot.tick(words=[word(robot.now - age)]).recover is counts
+
+
 @pytest.mark.parametrize("mode", MODES)
 def test_the_status_is_stamped_evenly_however_late_the_process_is_woken(mode):
     robot = DrivenRobot(mode)
