@@ -214,8 +214,10 @@ def _library(robot: str) -> Any:
     try:
         return import_module(_MODULES[robot])
     except ImportError:
+        python = " with Python 3.11 or 3.12, for which alone there is one" if robot == "fr3" else ""
         raise LinkError(
-            f"station.panda.robot is {robot}, which needs {PACKAGES[robot]}: pip install 'riseg-drake[{robot}]'"
+            f"station.panda.robot is {robot}, which needs {PACKAGES[robot]}: "
+            f"pip install 'riseg-drake[{robot}]'{python}"
         ) from None
 
 

@@ -148,7 +148,7 @@ def begun(monkeypatch, tmp_path):
     )
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(drive_arm, "FrankaLink", lambda name, ip: robot)
-    monkeypatch.setattr(drive_arm, "be_prompt", lambda priority: None)
+    monkeypatch.setattr(drive_arm, "be_prompt", lambda priority: setattr(robot, "priority", priority))
     return robot
 
 
@@ -161,6 +161,7 @@ def test_it_drives_in_the_scenarios_mode_or_the_one_it_was_told_until_ctrl_c(wor
     assert (begun.configured, begun.modes) == (1, [is_velocity])
     assert [finished for _, finished in begun.told] == [False, False, False, True]
     assert signal.getsignal(signal.SIGINT) is handler
+    assert begun.priority == 80  # docs/hardware.md has it: `ulimit -r 80`
     out = " ".join(capsys.readouterr().out.split())
     mode = "velocity" if is_velocity else "position"
     assert f"drive-arm: fr3 at 172.16.0.2, commands of {mode} from PANDA_COMMAND; " in out
