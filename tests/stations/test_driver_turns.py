@@ -1,5 +1,6 @@
 """The turns of the arm's driver with a robot that plays a script: no libfranka, a millisecond at a time."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from pydrake.lcm import DrakeLcm
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.limits import FR3_LIMITS
 from riseg_drake.robot.supervisor import MOVE, REFLEX, USER_STOPPED
+from riseg_drake.stations import drive_process
 from riseg_drake.stations.arm_drive import HELD, ArmDrive, Drive
 from riseg_drake.stations.drive_process import DriveProcess
 from riseg_drake.stations.franka_link import RobotStopped
@@ -103,6 +105,14 @@ def test_an_idle_robot_is_controlled_at_once_and_every_cycle_tells_one_status_st
     assert modes(played, 2, 100) == [MOVE] * 99
     assert [message.robot_utime for message in played.statuses[-2:]] == [4000_099_000, 4000_100_000]
     assert not played.reasons
+
+
+def test_the_work_of_a_cycle_is_what_this_threads_processor_time_gained_in_it(monkeypatch):
+    looks = itertools.count()
+    monkeypatch.setattr(drive_process.time, "thread_time", lambda: 100.0 + 2.55e-4 * next(looks))
+    cycles = Played({100: end}).process.cycles
+    assert cycles.percentile(1) == pytest.approx(2.55e-4, abs=1e-9)
+    assert cycles.longest == pytest.approx(2.55e-4, abs=1e-9)
 
 
 @pytest.mark.parametrize("mode", ["position", "velocity"])
