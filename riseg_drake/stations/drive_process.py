@@ -20,6 +20,9 @@ from riseg_drake.stations.driver_reasons import reasons_message
 from riseg_drake.stations.franka_link import Link, RobotStopped
 from riseg_drake.stations.lcm_channels import LcmConfig
 
+PRIORITY = 80
+"""Among real-time processes, where the system allows that: before the one that sends commands."""
+
 _STOPPED_BY = {3: "somebody guides the arm by hand", 5: "the stop button is pressed"}
 _IDLE = 1
 _TELL_ERRORS = 0.1  # s; between two messages with the names of errors, while there are any

@@ -13,14 +13,13 @@ from pydrake.lcm import DrakeLcm
 from rich.console import Console
 from rich.table import Table
 
-from riseg_drake.app.hardware.drive_arm import PRIORITY
 from riseg_drake.robot.command_stream import POSITION, VELOCITY
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.limits import FR3_LIMITS
 from riseg_drake.robot.supervisor import MOVE
 from riseg_drake.stations.arm_drive import ArmDrive, Drive, RobotReading
 from riseg_drake.stations.command_session import command_message
-from riseg_drake.stations.drive_process import DriveProcess
+from riseg_drake.stations.drive_process import PRIORITY, DriveProcess
 from riseg_drake.stations.franka_link import Cycle
 from riseg_drake.stations.lcm_channels import LcmConfig
 from riseg_drake.stations.promptness import be_prompt
