@@ -44,6 +44,9 @@ def add_bench_options(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--stops", action="store_true", help="measure instead how soon a moving arm stands still, over LCM"
     )
+    command.add_argument(
+        "--driver", action="store_true", help="measure a cycle of `riseg drive-arm` instead, without an arm"
+    )
     command.add_argument("--raft", action="store_true", help="measure RAFT instead, small and large")
     command.add_argument(
         "--sam", action="store_true", help="measure Segment Anything instead, and the frames beside it"

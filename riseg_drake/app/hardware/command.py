@@ -184,7 +184,9 @@ class _Session:
                 )
                 listeners.append(stack.enter_context(recording))
             off_path = self._config.command.safety.off_path
-            watch = ArmWatch(wired, commands, self._operator, self._progress, way_back, off_path)
+            watch = ArmWatch(
+                wired, commands, self._reception, self._operator, self._progress, way_back, off_path
+            )
             try:
                 self._interact(wired, lambda context: watch(context) or self._is_silent(PATIENCE), listeners)
             finally:

@@ -17,15 +17,13 @@ from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.robot.limits import RobotLimits
 from riseg_drake.stations.arm_drive import ArmDrive
-from riseg_drake.stations.drive_process import DriveProcess
+from riseg_drake.stations.drive_process import PRIORITY, DriveProcess
 from riseg_drake.stations.franka_link import FrankaLink, Link, LinkError, RobotStopped
 from riseg_drake.stations.lcm_channels import open_lcm
 from riseg_drake.stations.promptness import be_prompt
 
 CHECKED_FOR = 5.0
 """`--check` reads for so long, s."""
-PRIORITY = 80
-"""Among real-time processes, where the system allows that: before the one that sends commands."""
 LOAD, LOAD_CENTER = 0.05, 0.02
 """By how much the load that is set in Desk may differ from the scenario's tool, kg and m."""
 SLOWEST_RATE = 990.0
@@ -69,9 +67,8 @@ def drive_arm_command(request: DriveRequest, console: Console) -> None:
     with _ended_by_signals(process):
         be_prompt(PRIORITY)
         process.run()
-    if process.cycles:
-        p50, p999 = 1e3 * np.percentile(process.cycles, [50, 99.9])
-        console.print(f"drive-arm: work of a cycle {p50:.2f} ms (median), {p999:.2f} ms (99.9 % are shorter)")
+    if process.cycles.count:
+        console.print(f"drive-arm: work of a cycle {process.cycles.told()}")
 
 
 class _ended_by_signals:  # noqa: N801 - is read as a context manager
