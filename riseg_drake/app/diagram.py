@@ -218,7 +218,9 @@ def make_diagram(
     builder.Connect(arm.GetOutputPort("position"), station.GetInputPort("panda.position"))
     refiner = add_refinement(builder, scenario, segmentation, arm)
     if meshcat is not None:
-        view = builder.AddSystem(MeshcatView(meshcat, 1 / config.camera.rate, _stage(scenario, kinematics.tool)))
+        view = builder.AddSystem(
+            MeshcatView(meshcat, 1 / config.camera.rate, _stage(scenario, kinematics.tool))
+        )
         for name in ("pair", "segmentation"):
             builder.Connect(segmentation.outputs[name], view.GetInputPort(name))
         for name in ("active_push", "interaction_step", "phase"):

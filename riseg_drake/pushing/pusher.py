@@ -1,4 +1,4 @@
-"""The end effector as a push needs to know it: a vertical tip with a rectangular cross section, and its height."""
+"""The end effector as a push needs to know it: a vertical tip, rectangular from below."""
 
 from dataclasses import dataclass, field
 

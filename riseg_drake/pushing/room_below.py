@@ -1,6 +1,6 @@
 """What hangs over the table beside the tool's tip: whether the things there are low enough for it.
 
-A bar of 30 cm has nothing but air beside it; right above closed fingers there is a hand, and a camera ahead of it.
+A bar has nothing but air beside it; right above closed fingers there is a hand, and a camera ahead of it.
 """
 
 import numpy as np
@@ -22,9 +22,9 @@ def room_below_the_tool(
 ) -> NDArray[np.bool_]:
     """Which of N pushes bring nothing of the tool beside its tip to within the margin of a thing.
 
-    What is `pushed` [rows, columns] stays where it is below the tool from the contact on, everything else is passed
-    over from where the tool is lowered to where the push ends. What is ahead of the tip by less than the margin may
-    touch what is pushed: it pushes, too.
+    What is `pushed` [rows, columns] stays where it is below the tool from the contact on, everything else is
+    passed over from where the tool is lowered to where the push ends. What is ahead of the tip by less than the
+    margin may touch what is pushed: it pushes, too.
 
     Args:
         b_W: contacts [N, 2], m.

@@ -35,17 +35,17 @@ class PandaDescription:
     arm_url: str = f"package://{MODELS_PACKAGE}/panda/panda.urdf"
     """Or the official description: package://drake_models/franka_description/urdf/panda_arm.urdf."""
     tool: str = "bar"
-    """`bar`, the paper's of 30 cm; `hand`, the Franka hand with closed fingers; or an SDF or URDF file, its path
-    relative to the scenario's file, with the frames `tip` and, for a camera on the wrist, `camera`. Where the
-    camera is fixed to the world, bar and hand carry none."""
+    """`bar`, the paper's of 30 cm; `hand`, the Franka hand with closed fingers; or an SDF or URDF file, its
+    path relative to the scenario's file, with the frames `tip` and, for a camera on the wrist, `camera`. Where
+    the camera is fixed to the world, bar and hand carry none."""
     drake_models: str = ""
     """Folder of an offline copy of the package drake_models; empty: Drake's own, which it downloads."""
     tool_yaw: float = field(default=0.0, metadata={"least": -6.2832, "most": 6.2832})
     """By how much the tool is turned on the flange (panda_link8) about its z axis, beyond what its model says
     itself (the hand: by -45 degrees, as it is bolted), rad."""
     X_EC: list[float] = field(default_factory=list, metadata={"sizes": (0, 6)})
-    """The camera on the tool as calibrated, in the frame of its tip: x, y, z in m, roll, pitch, yaw in rad; empty:
-    as the tool's model has it."""
+    """The camera on the tool as calibrated, in the frame of its tip: x, y, z in m, roll, pitch, yaw in rad;
+    empty: as the tool's model has it."""
 
     def check(self) -> None:
         """Raise ValueError for a camera that is nowhere on the tool."""
@@ -139,7 +139,9 @@ def add_panda(
                 f"X_EC: {len(description.X_EC)} numbers; expected 6: x, y, z in m and roll, pitch, yaw in rad"
             )
         X_EC = RigidTransform(RollPitchYaw(description.X_EC[3:]), description.X_EC[:3])
-        camera_frame = plant.AddFrame(FixedOffsetFrame("calibrated_camera", tool.tip_frame, X_EC, tool.instance))
+        camera_frame = plant.AddFrame(
+            FixedOffsetFrame("calibrated_camera", tool.tip_frame, X_EC, tool.instance)
+        )
     return PandaParts(arm=arm, tool=tool.instance, tip_frame=tool.tip_frame, camera_frame=camera_frame)
 
 

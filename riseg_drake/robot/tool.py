@@ -16,8 +16,8 @@ from riseg_drake.host.terminal import one_line
 OWN_TOOLS = {"bar": ("pusher.sdf", "bar.sdf"), "hand": ("hand_with_camera.sdf", "hand.sdf")}
 """Files in models/pusher by the tool's name: with a camera on it, and bare, for a camera that is elsewhere."""
 NO_CAMERA = (
-    "no frame `camera` (the colour camera's optical frame: x right, y down, z ahead); without one the camera's place "
-    "is told by X_EC, or by mount: world"
+    "no frame `camera` (the colour camera's optical frame: x right, y down, z ahead); without one the camera's "
+    "place is told by X_EC, or by mount: world"
 )
 ENDINGS = (".sdf", ".urdf")
 
@@ -82,8 +82,8 @@ def add_tool(
     plant.WeldFrames(flange, base.body_frame(), RigidTransform(RollPitchYaw(0, 0, yaw), np.zeros(3)))
     if not plant.HasFrameNamed("tip", instance):
         raise ToolError(
-            f"{file}: no frame `tip`; it is wanted in the middle of the tip's end face, z out along the tool, x the "
-            "direction of pushing"
+            f"{file}: no frame `tip`; it belongs in the middle of the tip's end face, "
+            "z out along the tool, x the direction of pushing"
         )
     camera = plant.GetFrameByName("camera", instance) if plant.HasFrameNamed("camera", instance) else None
     return ToolParts(instance, plant.GetFrameByName("tip", instance), camera)
@@ -102,5 +102,5 @@ def _base(plant: MultibodyPlant, instance: ModelInstanceIndex, file: Path) -> Ri
     loose = [plant.get_body(index) for index in bodies if index not in children]
     if len(loose) != 1:
         names = ", ".join(body.name() for body in loose)
-        raise ToolError(f"{file}: its links {names} hang together by no joint; fixed joints to one of them would do")
+        raise ToolError(f"{file}: its links {names} hang together by no joint; fixed joints would do")
     return loose[0]

@@ -1,4 +1,4 @@
-"""How wide, thick and long a tool is, and how much room is below what is not its tip, by its collision geometry.
+"""How wide, thick and long a tool is, and what room is below the rest of it, by its collision geometry.
 
 The tool is looked at upright, as it pushes: E's z axis points down, x along the push. Its tip is all of it that
 is at most TIP_REACH above E; what is beside the tip's cross section further up hangs over the table, and things
@@ -91,18 +91,20 @@ def tool_shape(
     if abs(lowest) > ASKEW:
         raise ToolError(
             f"{name}: its collision geometry ends {1e3 * abs(lowest):.1f} mm "
-            f"{'above' if lowest > 0 else 'below'} the frame `tip`; that belongs on the end face, z pointing out"
+            f"{'above' if lowest > 0 else 'below'} the frame `tip`; that belongs on the end face, z out"
         )
     tip = np.vstack([piece.between(lowest, lowest + TIP_REACH) for piece in pieces])[:, :2]
     middle = (tip.min(axis=0) + tip.max(axis=0)) / 2
     if np.abs(middle).max() > ASKEW:
         raise ToolError(
-            f"{name}: the middle of its tip is {1e3 * middle[0]:.1f} mm along x and {1e3 * middle[1]:.1f} mm along y "
-            "from the frame `tip`; that belongs in it"
+            f"{name}: the middle of its tip is {1e3 * middle[0]:.1f} mm along x and {1e3 * middle[1]:.1f} mm "
+            "along y from the frame `tip`; that belongs in it"
         )
     thickness, width = np.ptp(tip, axis=0)
     if min(thickness, width) < ASKEW:
-        raise ToolError(f"{name}: its tip is {1e3 * thickness:.1f} x {1e3 * width:.1f} mm; nothing can be pushed by it")
+        raise ToolError(
+            f"{name}: its tip is {1e3 * thickness:.1f} x {1e3 * width:.1f} mm; nothing can be pushed by it"
+        )
     X_EF = flange.CalcPose(context, tip_frame)
     return ToolShape(
         thickness=round(float(thickness), 9),
@@ -146,11 +148,10 @@ def _overhangs(pieces: Sequence[_Piece], tip: NDArray, above: float) -> tuple[Ov
             if len(corners):
                 kept.append(_around(corners[:, :2], float(corners[:, 2].min())))
     kept.sort(key=lambda overhang: overhang.bottom)
-    apart = [
-        each
-        for i, each in enumerate(kept)
-        if not any(other.covers(each) and (j < i or not each.covers(other)) for j, other in enumerate(kept) if j != i)
-    ]
+    apart: list[Overhang] = []
+    for each in kept:  # of two that cover each other, the first
+        if not any(other.covers(each) for other in apart):
+            apart.append(each)
     return tuple(each for each in apart if each.bottom > 0)
 
 

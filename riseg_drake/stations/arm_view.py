@@ -17,7 +17,10 @@ def add_arm_view(
     meshcat: Meshcat,
     parameters: MeshcatVisualizerParams,
 ) -> InputPort:
-    """Show the arm, and a camera that is fixed to the world at X_WC [4, 4]; the port takes joint angles, rad [7]."""
+    """Show the arm, and a camera that is fixed to the world at X_WC [4, 4].
+
+    The port takes joint angles, rad [7].
+    """
     plant = MultibodyPlant(0.0)
     scene_graph = builder.AddSystem(SceneGraph())
     plant.RegisterAsSourceForSceneGraph(scene_graph)

@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from riseg_drake.robot.shape_corners import shape_corners
 
+
 @dataclass(frozen=True)
 class Footprint:
     """The collision geometry of one body seen from above, and where its lowest point is."""

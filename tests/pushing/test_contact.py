@@ -10,7 +10,9 @@ ALONG_X = np.array([[1.0, 0.0]])
 
 
 def contact_of(drawn, cluster, boundary_W):
-    return find_contacts(np.array([boundary_W]), ALONG_X, cluster, drawn.map(), Pusher(BAR), ValidityParameters())
+    return find_contacts(
+        np.array([boundary_W]), ALONG_X, cluster, drawn.map(), Pusher(BAR), ValidityParameters()
+    )
 
 
 def test_bar_touches_what_protrudes_within_its_width(drawn):

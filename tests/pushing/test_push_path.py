@@ -135,17 +135,11 @@ def test_tip_rises_first_where_the_observation_posture_is_lower_than_things(push
 
 @pytest.mark.parametrize("x", [0.95, 0.05])
 def test_push_out_of_reach_has_no_path(push, panda, q_observe, x):
-    assert (
-        plan_push_path(replace(push, p_WE=np.array([x, 0.1, 0.008])), panda, q_observe)
-        is PathStage.POSTURE
-    )
+    assert plan_push_path(replace(push, p_WE=np.array([x, 0.1, 0.008])), panda, q_observe) is PathStage.POSTURE
 
 
 def test_things_as_tall_as_the_pusher_are_not_pushed(push, panda, q_observe):
-    assert (
-        plan_push_path(replace(push, tallest=0.27), panda, q_observe)
-        is PathStage.ROOM_BELOW_THE_FLANGE
-    )
+    assert plan_push_path(replace(push, tallest=0.27), panda, q_observe) is PathStage.ROOM_BELOW_THE_FLANGE
 
 
 @pytest.fixture(scope="module")

@@ -87,7 +87,9 @@ def test_a_bar_has_room_beside_whatever_it_can_push(drawn):
     assert fits(drawn.box(0.5, 0.05, 0.02, 0.02, height=0.25), pushed_height=0.25, tool=bar)
 
 
-def test_beside_something_taller_than_the_hand_leaves_room_for_the_bar_pushes_and_the_hand_does_not(new_table, hand):
+def test_between_walls_that_are_taller_than_its_fingers_the_hand_pushes_nothing_and_the_bar_does(
+    new_table, hand
+):
     """A low box between two walls of 60 mm, 120 mm apart: the tips fit, the hand of 204 mm does not."""
     for tool, ending in ((PandaKinematics().tool, None), (hand.tool, Ending.NOTHING_VALID)):
         drawn = new_table().box(0.5, 0.0, 0.04, 0.03, height=0.03)
@@ -101,7 +103,9 @@ def test_beside_something_taller_than_the_hand_leaves_room_for_the_bar_pushes_an
 
 def test_a_plan_for_the_hand_keeps_its_margin_to_all_things_at_all_heights_on_all_of_its_way(new_table, hand):
     drawn = new_table().box(0.5, 0.0, 0.05, 0.04, yaw=0.3, height=0.03)
-    drawn.box(0.5, 0.07, 0.05, 0.03, height=0.02, segmented=True).disc(0.44, -0.06, 0.015, height=0.04, segmented=True)
+    drawn.box(0.5, 0.07, 0.05, 0.03, height=0.02, segmented=True).disc(
+        0.44, -0.06, 0.015, height=0.04, segmented=True
+    )
     table, parameters = drawn.map(), FindActionParameters()
     q_observe = observation_posture(hand, [0.5, 0.0], 0.36)
     push = find_action(
@@ -121,10 +125,14 @@ def test_a_plan_for_the_hand_keeps_its_margin_to_all_things_at_all_heights_on_al
         X_WE = hand.X_WE(q)
         p_EQ = (np.column_stack([strangers, height]) - X_WE[:3, 3]) @ X_WE[:3, :3]
         low = X_WE[2, 3] < lowest_tip - 1e-3
-        tip = Overhang(0.0, (-hand.tool.thickness / 2, hand.tool.thickness / 2), (-0.0152, 0.0152))
+        tip = Overhang(
+            0.0,
+            (-hand.tool.thickness / 2, hand.tool.thickness / 2),
+            (-hand.tool.width / 2, hand.tool.width / 2),
+        )
         for part in (tip, *hand.tool.overhangs) if low else (tip,):
             beside = np.maximum(np.abs(p_EQ[:, 0] - np.mean(part.x)) - np.ptp(part.x) / 2, 0)
             beside = np.hypot(beside, np.maximum(np.abs(p_EQ[:, 1] - np.mean(part.y)) - np.ptp(part.y) / 2, 0))
             above = -p_EQ[:, 2] - part.bottom  # of the thing's top over the part's lowest point
-            # Half the margin beside the tip during the stroke (contact.py), the whole of it above; cells are 2 mm.
+            # Half the margin beside the tip during the stroke (contact.py), all of it above; cells are 2 mm.
             assert not ((beside < parameters.pusher.margin / 2 - 0.0015) & (above > -0.004)).any()

@@ -22,8 +22,8 @@ STICK = box((0.012, 0.026, 0.2), (0, 0, 0.1))
 def sdf(shapes=STICK, frames=TIP + CAMERA, more="", link="base"):
     """A tool 20 cm long, 12 mm thick and 26 mm wide, unless it is told otherwise."""
     return (
-        f'<sdf version="1.9"><model name="own"><link name="{link}"><inertial><mass>0.3</mass><pose>0 0 0.1 0 0 0</pose>'
-        "<inertia><ixx>0.001</ixx><iyy>0.001</iyy><izz>0.0001</izz></inertia></inertial>"
+        f'<sdf version="1.9"><model name="own"><link name="{link}"><inertial><mass>0.3</mass>'
+        "<pose>0 0 0.1 0 0 0</pose><inertia><ixx>1e-3</ixx><iyy>1e-3</iyy><izz>1e-4</izz></inertia></inertial>"
         f"{shapes}</link>{frames}{more}</model></sdf>"
     )
 

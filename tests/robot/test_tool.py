@@ -148,5 +148,7 @@ def test_what_is_no_tool_is_refused_in_one_line(refusal, text, words):
 
 def test_frames_need_no_mounting_on_the_base(own):
     hung = STICK + "</link>" + link("lens").removesuffix("</link>")
-    arm = own(sdf(shapes=hung, frames=TIP + frame("camera", (0, 0, 0, 0, 0, 0)), more=joint("fixed", "base", "lens")))
+    arm = own(
+        sdf(shapes=hung, frames=TIP + frame("camera", (0, 0, 0, 0, 0, 0)), more=joint("fixed", "base", "lens"))
+    )
     np.testing.assert_allclose(arm.X_EC[:3, 3], [0, 0, -0.2], atol=1e-12)

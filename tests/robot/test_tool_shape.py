@@ -37,11 +37,13 @@ def test_the_bar_is_20_by_30_mm_and_30_cm_long_with_its_plate_and_camera_above()
 
 def test_the_hand_pushes_with_its_two_fingertips_side_by_side_and_has_fingers_hand_and_camera_above():
     tool = PandaKinematics(PandaDescription(tool="hand")).tool
-    assert (tool.thickness, tool.width, tool.length) == (0.0175, 2 * 0.0152, 0.1129)
-    narrower, narrowing, fingers, hand, camera = tool.overhangs
-    assert numbers(fingers) == near(Overhang(0.1129 - 0.0794, (-0.011, 0.011), (-0.026, 0.026)))
-    assert numbers(hand) == near(Overhang(0.1129 - 0.066, (-0.0315, 0.0315), (-0.102, 0.102)))
+    assert (tool.thickness, tool.width, tool.length) == (0.018, 2 * 0.0158, 0.1129)
+    narrower, narrowing, fingers, hand, shoulders, camera, plug = tool.overhangs
+    assert numbers(fingers) == near(Overhang(0.1129 - 0.0794, (-0.011, 0.011), (-0.0265, 0.0265)))
+    assert numbers(hand) == near(Overhang(0.1129 - 0.066, (-0.023, 0.023), (-0.102, 0.102)))
+    assert numbers(shoulders) == near(Overhang(0.1129 - 0.02, (-0.0315, 0.0315), (-0.104, 0.104)))
     assert numbers(camera) == near(Overhang(0.1129 - 0.006, (0.0316, 0.091), (-0.056, 0.056)))
+    assert numbers(plug) == near(Overhang(0.1129 + 0.01, (-0.006, 0.006), (-0.105, -0.041)))
     assert tool.thickness / 2 == pytest.approx(narrower.x[1]) == pytest.approx(narrowing.x[1])
     assert tool.width < np.ptp(narrower.y) < np.ptp(narrowing.y) < np.ptp(fingers.y)
 
@@ -58,8 +60,8 @@ def test_what_is_within_15_mm_of_the_end_face_is_the_tip_and_what_is_above_hangs
 
 def test_a_round_tip_is_as_thick_as_its_diameter(shape):
     rod = (
-        '<collision name="rod"><pose>0 0 0.1 0 0 0</pose><geometry><cylinder><radius>0.01</radius><length>0.2</length>'
-        "</cylinder></geometry></collision>"
+        '<collision name="rod"><pose>0 0 0.1 0 0 0</pose><geometry><cylinder><radius>0.01</radius>'
+        "<length>0.2</length></cylinder></geometry></collision>"
     )
     tool = shape(rod)
     assert (tool.thickness, tool.width, tool.overhangs) == (0.02, 0.02, ())
@@ -67,8 +69,8 @@ def test_a_round_tip_is_as_thick_as_its_diameter(shape):
 
 def test_a_ball_is_measured_up_to_where_the_tip_ends(shape):
     ball = (
-        '<collision name="ball"><pose>0 0 0.17 0 0 0</pose><geometry><sphere><radius>0.03</radius></sphere></geometry>'
-        "</collision>"
+        '<collision name="ball"><pose>0 0 0.17 0 0 0</pose><geometry><sphere><radius>0.03</radius></sphere>'
+        "</geometry></collision>"
     )
     tool = shape(ball)
     # 15 mm above the lowest point of a ball of 30 mm its circle has the radius sqrt(30^2 - 15^2) mm; as a
@@ -91,8 +93,8 @@ def test_the_frame_tip_says_which_way_is_along_the_push(shape):
 
 
 def test_a_tool_that_widens_evenly_hangs_over_in_steps_each_no_higher_than_it_is(shape):
-    # A wedge: box of 40 mm turned by 45 degrees about y stands on an edge, cut to 8 mm by nothing: the tip is what is
-    # below 15 mm, 30 mm thick there; above, it is twice as thick as it is high.
+    # A box of 40 mm turned by 45 degrees about y stands on an edge. At any height it is twice as thick as it is
+    # high, so 30 mm where the tip ends.
     wedge = box((0.04, 0.03, 0.04), (0, 0, 0.2 - 0.02 * np.sqrt(2))).replace(
         "0 0 0</pose>", "0 0.7853981633974483 0</pose>"
     )

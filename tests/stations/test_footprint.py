@@ -4,14 +4,7 @@ import numpy as np
 import pytest
 from pydrake.geometry import (
     Box,
-    Capsule,
-    Convex,
-    Cylinder,
-    Ellipsoid,
-    HalfSpace,
-    MeshcatCone,
     SceneGraph,
-    Sphere,
 )
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
@@ -19,7 +12,6 @@ from pydrake.solvers import MathematicalProgram, Solve
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
-from riseg_drake.robot.shape_corners import shape_corners
 from riseg_drake.stations.footprint import Footprint, footprint, separation, travel
 
 RIGHT = np.array([1.0, 0.0])
