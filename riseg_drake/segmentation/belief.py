@@ -76,6 +76,10 @@ class Bodies(Immutable):
     """[G, 4, 4], seen from the keyframe's camera; the first is standing still."""
     next_id: int
 
+    def seen_from(self, X_NK: NDArray[np.float64]) -> "Bodies":
+        """The same with motions as a camera N sees them, in which the keyframe's has the pose X_NK [4, 4]."""
+        return replace(self, motions_K=X_NK @ self.motions_K @ inverse(X_NK))
+
 
 def first_belief(
     frame: Frame, above: AboveTable, noise: MeasurementNoise, parameters: BeliefParameters
@@ -155,7 +159,7 @@ def carry_bodies(
         return found
     # Too near for the camera to measure: the depth that the keyframe has, moved, must do.
     image = belief.keyframe.image_of((label + 1).astype(np.uint16))
-    drawn = draw_labels(belief.keyframe.frame, frame, image, moves)
+    drawn, _ = draw_labels(belief.keyframe.frame, frame, image, moves)
     blind = np.flatnonzero(blind & (drawn > 0))
     found.ravel()[blind] = id_of.take(drawn.ravel().take(blind))
     return found

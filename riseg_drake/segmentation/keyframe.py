@@ -1,7 +1,8 @@
 """The picture of the last rest, cut into superpixels: what every later frame is compared with."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,6 +14,7 @@ from riseg_drake.geometry.rgbd import Frame, Immutable
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.alignment import EdgePixels, edge_pixels, has_contrast
 from riseg_drake.segmentation.noise import MeasurementNoise, gray_variance
+from riseg_drake.segmentation.propagation import draw_labels
 from riseg_drake.segmentation.superpixels import (
     Superpixels,
     split_superpixels,
@@ -27,6 +29,8 @@ _BOUNDARY = np.ones((5, 5), np.uint8)
 """Two pixels on each side of an outline are blurred, interpolated across it, or without true depth."""
 _PINHOLE = np.ones((3, 3), np.uint8)
 """A larger hole in depth is mostly an outline's."""
+_THERE = 0.015
+"""m; what is seen within that of where it is drawn may be it."""
 
 
 @dataclass
@@ -56,6 +60,8 @@ class Keyframe(Immutable):
     is as high as what is near."""
     superpixels: Superpixels
     """Of the region."""
+    side: float
+    """Pixels; of a superpixel, about, where they were cut."""
     over: NDArray[np.bool_]
     """[M], borders at which one side may lie on the other."""
     area: NDArray[np.intp]
@@ -96,9 +102,7 @@ class Keyframe(Immutable):
     @property
     def length(self) -> NDArray[np.float64]:
         """[M], of each border, in sides of a superpixel."""
-        return self.superpixels.length / max(
-            1.0, float(np.sqrt(np.median(self.area))) if len(self.area) else 1.0
-        )
+        return self.superpixels.length / self.side
 
     @cached_property
     def point_count(self) -> NDArray[np.intp]:
@@ -146,29 +150,64 @@ def make_keyframe(
     cut = with_gaps(cut, parameters.gap * above.pixels_per_metre(frame.intrinsics))
     owner = np.full(above.mask.shape, -1, np.intp)
     owner[region] = cut.label
-    variance = gray_variance(frame.gradient_squared, noise)
-    measured = cv2.morphologyEx((frame.depth > 0).view(np.uint8), cv2.MORPH_CLOSE, _PINHOLE)
-    core = cv2.erode(measured * (owner >= 0).view(np.uint8), _BOUNDARY, borderValue=0) > 0
-    core[::2, ::2] = core[1::2, 1::2] = False
-    points = surface_pixels(core, frame.depth, frame.intrinsics)
-    v, u = points.pixel
+    area = np.bincount(cut.label[cut.label >= 0], minlength=cut.count)
     return Keyframe(
         frame=frame,
         above=above,
         region=region,
         height=height,
         superpixels=cut,
+        side=max(1.0, float(np.sqrt(np.median(area))) if len(area) else 1.0),
         over=may_lie_on(cut, height),
-        area=np.bincount(cut.label[cut.label >= 0], minlength=cut.count),
-        points=points,
-        owner=owner[v, u],
-        gray=frame.gray[v, u],
-        variance=variance[v, u],
-        gradient_squared=frame.gradient_squared[v, u],
-        edges=edge_pixels(
+        area=area,
+        **_compared(frame, owner, noise, parameters),
+    )
+
+
+def seen_again(
+    keyframe: Keyframe, frame: Frame, above: AboveTable, noise: MeasurementNoise, parameters: KeyframeParameters
+) -> Keyframe:
+    """The keyframe, cut as it is, as another frame shows it in which all stands as it stood then.
+
+    From another view depth errs otherwise, gloss shows other lights, and what is near is twice as large. Where
+    the frame has no depth, as it is too near, that of the keyframe must do.
+    """
+    number = keyframe.image_of(np.arange(1, keyframe.count + 1, dtype=np.uint16))
+    drawn, depth = draw_labels(keyframe.frame, frame, number, {})
+    elsewhere = (frame.depth > 0) & (np.abs(frame.depth - depth) > _THERE)
+    owner = np.where(frame.robot | elsewhere, 0, drawn).astype(np.intp) - 1
+    completed = replace(frame, depth=np.where(frame.depth > 0, frame.depth, depth))
+    return replace(
+        keyframe,
+        frame=completed,
+        above=replace(above, mask=above.mask | (owner >= 0)),
+        region=(slice(None), slice(None)),
+        superpixels=replace(keyframe.superpixels, label=owner),
+        area=np.bincount(owner[owner >= 0], minlength=keyframe.count),
+        **_compared(completed, owner, noise, parameters),
+    )
+
+
+def _compared(
+    frame: Frame, owner: NDArray[np.intp], noise: MeasurementNoise, parameters: KeyframeParameters
+) -> dict[str, Any]:
+    """A keyframe's fields from `points` on, by the superpixel [H, W] of each pixel of a frame, -1 = none."""
+    variance = gray_variance(frame.gradient_squared, noise)
+    measured = cv2.morphologyEx((frame.depth > 0).view(np.uint8), cv2.MORPH_CLOSE, _PINHOLE)
+    core = cv2.erode(measured * (owner >= 0).view(np.uint8), _BOUNDARY, borderValue=0) > 0
+    core[::2, ::2] = core[1::2, 1::2] = False
+    points = surface_pixels(core, frame.depth, frame.intrinsics)
+    v, u = points.pixel
+    return {
+        "points": points,
+        "owner": owner[v, u],
+        "gray": frame.gray[v, u],
+        "variance": variance[v, u],
+        "gradient_squared": frame.gradient_squared[v, u],
+        "edges": edge_pixels(
             frame, owner, has_contrast(frame.gradient_squared, noise), variance, parameters.edge_pixels
         ),
-    )
+    }
 
 
 def _filled(height: NDArray[np.float32], inside: NDArray[np.bool_]) -> NDArray[np.float32]:

@@ -34,6 +34,9 @@ _BOUNDARY = np.ones((7, 7), np.uint8)
 _CLOSE = 5
 """Pixels; smaller gaps between points of one thing are closed."""
 
+_BEHIND = 0.03
+"""Share of its depth by which what shows through such a gap lies behind."""
+
 
 def carry_labels(
     pair: FramePair,
@@ -84,33 +87,37 @@ def draw_labels(
     current: Frame,
     label_0: NDArray[np.uint16],
     motion_of: Mapping[int, NDArray[np.float64]],
-) -> NDArray[np.uint16]:
-    """The labels [H, W] of the reference frame drawn into the current one by the depth of the former.
+) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
+    """The labels [H, W] of the reference frame drawn into the current one by the depth of the former, and the
+    depth [H, W] that they have there, m, 0 where nothing is drawn.
 
     For pixels where the current frame has no depth to look anything up by. `motion_of`: for the labels that
     moved, the motion [4, 4] in C0.
     """
-    drawn = np.zeros_like(label_0)
-    nearest = np.zeros(label_0.shape, np.float32)  # 1 / depth of what is drawn
     X_C1C0 = inverse(current.X_WC) @ reference.X_WC
     surface = surface_pixels(label_0 > 0, reference.depth, reference.intrinsics)
     owner = label_0.ravel().take(surface.index)
-    for a in np.flatnonzero(np.bincount(owner)):
-        own = surface.subset(np.flatnonzero(owner == a))
-        sought = seek(own, X_C1C0 @ motion_of.get(int(a), np.eye(4)))
+    still = np.ones(65536, bool)
+    still[list(motion_of)] = False
+    places, per_depths, labels = [], [], []
+    for ids, motion in _by_motion(motion_of):
+        own = np.flatnonzero(np.isin(owner, ids) if ids else still.take(owner))
+        sought = seek(surface.subset(own), X_C1C0 @ motion)
         inside = np.flatnonzero(sought.inside(current.intrinsics.shape))
-        if not len(inside):
-            continue
-        row, column = (np.rint(x.ravel()[inside]).astype(np.intp) for x in (sought.v, sought.u))
-        top, left = (max(0, int(x.min()) - _CLOSE) for x in (row, column))
-        region = np.s_[top : int(row.max()) + _CLOSE + 1, left : int(column.max()) + _CLOSE + 1]
-        spots = np.zeros(drawn[region].shape, np.float32)
-        spots[row - top, column - left] = 1 / sought.depth[inside]
-        # Nearer than it was, a thing is larger: its points leave gaps.
-        spots = cv2.morphologyEx(spots, cv2.MORPH_CLOSE, np.ones((_CLOSE, _CLOSE), np.uint8))
-        np.copyto(drawn[region], a, where=spots > nearest[region], casting="unsafe")
-        np.maximum(nearest[region], spots, out=nearest[region])
-    return drawn
+        v, u = (np.rint(x.ravel()[inside]).astype(np.intp) for x in (sought.v, sought.u))
+        places.append(v * current.intrinsics.width + u)
+        per_depths.append(1 / sought.depth[inside])
+        labels.append(owner[own[inside]])
+    place, per_depth, label = (np.concatenate(each) for each in (places, per_depths, labels))
+    order = np.argsort(per_depth, kind="stable")  # what is nearest is drawn last
+    spots, drawn = np.zeros(current.intrinsics.shape, np.float32), np.zeros(current.intrinsics.shape, np.uint16)
+    spots.ravel()[place[order]], drawn.ravel()[place[order]] = per_depth[order], label[order]
+    # Nearer than it was, a thing is larger: its points leave gaps, through which others show.
+    closed = cv2.morphologyEx(spots, cv2.MORPH_CLOSE, np.ones((_CLOSE, _CLOSE), np.uint8))
+    drawn[closed > (1 + _BEHIND) * spots] = 0
+    drawn = nearest_label(drawn, closed > 0, np.zeros_like(closed), _CLOSE)
+    drawn[drawn == UNKNOWN] = 0
+    return drawn, np.divide(1, closed, out=np.zeros_like(closed), where=drawn > 0)
 
 
 def nearest_label(

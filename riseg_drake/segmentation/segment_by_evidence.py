@@ -1,9 +1,9 @@
 """Alg. 2, line 7, by one model of evidence.
 
-Frames are compared with a keyframe, the picture of the last rest. While something moves, the motions of lines
-3 to 6 are chained to what each body has done since then, and carry the mask along. At the next rest both
-pictures are sharp, have depth, and span all that happened: that pair decides, its evidence is kept, and its
-second frame becomes the keyframe.
+Frames are compared with a keyframe, the picture of the last rest, or with what it looked like from nearer by
+before anything moved. While something moves, the motions of lines 3 to 6 are chained to what each body has done
+since then, and carry the mask along. At the next rest both pictures are sharp, have depth, and span all that
+happened: that pair decides, its evidence is kept, and its second frame becomes the keyframe.
 """
 
 from dataclasses import dataclass, field, replace
@@ -30,6 +30,7 @@ from riseg_drake.segmentation.bfif import BFIFParameters
 from riseg_drake.segmentation.candidates import candidate_motions
 from riseg_drake.segmentation.comparison import Comparison, renewed_view_error
 from riseg_drake.segmentation.frame_pairs import camera_span
+from riseg_drake.segmentation.keyframe import Keyframe, seen_again
 from riseg_drake.segmentation.memory import Memory, draw_memory, moved_memory, remember
 from riseg_drake.segmentation.motion_search import (
     MotionSearchParameters,
@@ -69,6 +70,8 @@ class EvidenceParameters:
     span: float = 15.0
     """Pixels that something has moved since the keyframe, from which what is seen in motion decides, too: hands
     do not rest."""
+    creep: float = 4.0
+    """Pixels from one frame to the next up to which the camera has nearly come to rest, and sees sharply."""
     uncovered: float = 0.3
     """Share of what stands there that the keyframe does not show, from which the view needs another."""
     search_every: float = 0.4
@@ -118,18 +121,15 @@ def segment_by_evidence(
     now = replace(now, view_error=renewed_view_error(now.view_error, pair))
     belief, bodies = now.belief, _bodies_before(now)
     assert belief is not None
-    compared = Comparison(
-        belief.keyframe,
-        frame,
-        depth_noise=max(above_1.depth_noise, belief.keyframe.above.depth_noise),
-        view_error=now.view_error.share(parameters.observation.likelihood.view_error),
-    )
-    candidates_K = candidate_motions(
+    # The camera N of the keyframe, or of what looked more as it does now: motions are told as it sees them.
+    compared = _compared(now, _nearest_view(now, frame), look)
+    X_NK = inverse(compared.keyframe.frame.X_WC) @ belief.keyframe.frame.X_WC
+    candidates_N = candidate_motions(
         compared,
         pair.reference,
         groups,
-        before.bodies.get(pair.reference.sequence, standing(belief)),
-        bodies,
+        before.bodies.get(pair.reference.sequence, standing(belief)).seen_from(X_NK),
+        bodies.seen_from(X_NK),
         bfif.motions.merge_flow,
         parameters.search.alignment,
     )
@@ -142,20 +142,25 @@ def segment_by_evidence(
     )
     if not deciding and now.still_since is None and frame.time - now.searched >= parameters.search_every:
         now = replace(now, searched=frame.time)
-        missing_K = missing_motion(_problem(belief, compared, look), candidates_K)
-        candidates_K = np.concatenate([candidates_K, missing_K])
-    if len(candidates_K) and not deciding:
-        seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters)
+        missing_N = missing_motion(_problem(belief, compared, look), candidates_N)
+        candidates_N = np.concatenate([candidates_N, missing_N])
+    if len(candidates_N) and not deciding:
+        seen, bodies = _explained(belief, compared, candidates_N, bodies, parameters)
         deciding = _has_gone_far(now, look, seen, bodies)
     # What the next keyframe cannot be compared with any more is looked for now.
     leaves = bool(above_1.mask.any()) and _leaves_keyframe(now, bodies, look)
     deciding |= leaves
     if deciding:
+        compared = _compared(now, belief.keyframe, look)
+        candidates_K = inverse(X_NK) @ candidates_N @ X_NK
         candidates_K = search_motions(_problem(belief, compared, look), candidates_K)
         if len(candidates_K):
             seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters)
         else:
             bodies = standing(belief)
+    if before.frame is not None and _is_worth_another_view(compared, before.frame, bodies, parameters):
+        near = seen_again(belief.keyframe, frame, above_1, bfif.noise, parameters.belief.keyframe)
+        now = replace(now, near=near)
     return _carried(now, look, seen, bodies, deciding=deciding, leaves=leaves)
 
 
@@ -188,15 +193,43 @@ def _bodies_before(now: Segmentation) -> Bodies:
     return now.bodies[max(now.bodies)] if now.bodies else standing(now.belief)
 
 
+def _nearest_view(now: Segmentation, frame: Frame) -> Keyframe:
+    """The keyframe, by its own frame or as it was seen again, whichever is more like this frame's view."""
+    assert now.belief is not None
+    views = [now.belief.keyframe] if now.near is None else [now.belief.keyframe, now.near]
+    return min(views, key=lambda view: camera_span(view.frame, frame))
+
+
+def _is_worth_another_view(
+    compared: Comparison, before: Frame, bodies: Bodies, parameters: EvidenceParameters
+) -> bool:
+    """Whether nothing has moved yet, and the camera, which hardly moves since the frame `before`, looks from
+    elsewhere than the keyframe did."""
+    creeps = camera_span(before, compared.frame) < parameters.creep
+    return creeps and compared.another_view == 1 and not (bodies.motion > 0).any()
+
+
+def _compared(now: Segmentation, keyframe: Keyframe, look: _Look) -> Comparison:
+    return Comparison(
+        keyframe,
+        look.frame,
+        depth_noise=max(look.above.depth_noise, keyframe.above.depth_noise),
+        view_error=now.view_error.share(look.parameters.observation.likelihood.view_error),
+    )
+
+
 def _explained(
     belief: Belief,
     compared: Comparison,
-    candidates_K: NDArray[np.float64],
+    candidates_N: NDArray[np.float64],
     before: Bodies,
     parameters: EvidenceParameters,
 ) -> tuple[Observation, Bodies]:
-    """What a frame says, given some motions [C, 4, 4], and the bodies by it."""
-    seen = observe(compared, belief.bond, belief.part, candidates_K, parameters.observation)
+    """What a frame says, given some motions [C, 4, 4] as the camera that it is compared with sees them, and the
+    bodies by it."""
+    seen = observe(compared, belief.bond, belief.part, candidates_N, parameters.observation)
+    X_KN = inverse(belief.keyframe.frame.X_WC) @ compared.keyframe.frame.X_WC
+    seen = replace(seen, motions_K=X_KN @ seen.motions_K @ inverse(X_KN))
     return bodies_of(belief, seen, before, parameters.belief, parameters.observation)
 
 
@@ -252,7 +285,9 @@ def _carried(
     # The pair's reference, from which the next groups tell, may be older than the new keyframe.
     seen_so_far = {pair.reference.sequence: standing(belief), **now.bodies}
     since = {s: rebased(b, bodies, belief.keyframe, following) for s, b in seen_so_far.items()}
-    return replace(now, margin=margin, belief=following, bodies=since, memory=memory, decided=decided)
+    return replace(
+        now, margin=margin, belief=following, near=None, bodies=since, memory=memory, decided=decided
+    )
 
 
 def _has_gone_far(now: Segmentation, look: _Look, seen: Observation, bodies: Bodies) -> bool:

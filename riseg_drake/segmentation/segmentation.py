@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.rgbd import Frame, Immutable
 from riseg_drake.segmentation.belief import Belief, Bodies
 from riseg_drake.segmentation.comparison import ViewError
+from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.memory import Memory
 from riseg_drake.segmentation.propagation import UNKNOWN
 
@@ -27,6 +28,8 @@ class Segmentation(Immutable):
     """The margin that leaves no doubt."""
     belief: Belief | None = None
     """As of the keyframe; None before anything stood on the table."""
+    near: Keyframe | None = None
+    """The belief's keyframe as it was seen again from a nearer view, before anything moved."""
     bodies: Mapping[int, Bodies] = field(default_factory=dict)
     """By frame number, since the pair's reference: the bodies, and how they moved since the keyframe."""
     frame: Frame | None = None

@@ -6,8 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
+from riseg_drake.geometry.camera import rays
+from riseg_drake.geometry.se3 import move_points
 from riseg_drake.segmentation.above_table import AboveTable, AboveTableParameters, objects_above_table
-from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe
+from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe, seen_again
 from riseg_drake.segmentation.noise import MeasurementNoise, gray_variance
 from tests.segmentation.drawn_scene import DrawnScene, looking_down, planar
 
@@ -150,3 +152,76 @@ def test_a_lower_box_in_front_of_a_higher_one_may_carry_it_and_a_flat_top_carrie
     assert between.any()
     assert keyframe.over[between].mean() > 0.8
     assert keyframe.over[~between].mean() < 0.1
+
+
+PLACES = [planar(-0.04, 0.0), planar(0.06, 0.0)]
+NEARER = looking_down(0.01, 0.0, z=0.25)
+
+
+def nearer(places=PLACES, **changed) -> tuple:
+    """The boxes from half as far: the frame, and the true labels."""
+    frame, label = DrawnScene(SIZES).frame(1, NEARER, places)
+    return replace(frame, **changed), label
+
+
+def again(keyframe: Keyframe, frame) -> Keyframe:
+    above = objects_above_table(nearer()[0], AboveTableParameters())
+    return seen_again(keyframe, frame, above, NOISE, KeyframeParameters())
+
+
+def middles(keyframe: Keyframe) -> np.ndarray:
+    """p_WQ [N, 3] of each superpixel's points, their mean."""
+    v, u = keyframe.points.pixel
+    p_WQ = rays(keyframe.frame.intrinsics)[v, u] * keyframe.points.depth[:, None]
+    p_WQ = move_points(keyframe.frame.X_WC, p_WQ.astype(float))
+    total = np.array([np.bincount(keyframe.owner, x, keyframe.count) for x in p_WQ.T])
+    return (total / np.maximum(keyframe.point_count, 1)).T
+
+
+@pytest.mark.parametrize("measured", [True, False], ids=["with depth", "too near for depth"])
+def test_seen_again_from_nearer_every_superpixel_is_where_it_was_and_larger(keyframe, measured):
+    frame, label = nearer()
+    frame = frame if measured else replace(frame, depth=np.zeros_like(frame.depth))
+    near = again(keyframe, frame)
+    shown = near.image_of(np.ones(near.count, np.uint8)) > 0
+    # From nearby sides are seen, too, which were not: they are of no superpixel.
+    assert np.mean(label[shown] > 0) > 0.995
+    assert np.mean(shown[label > 0]) > 0.96
+    both = (keyframe.point_count > 5) & (near.point_count > 5)
+    assert np.count_nonzero(both) > 0.97 * np.count_nonzero(keyframe.point_count > 5)
+    apart = np.linalg.norm(middles(near) - middles(keyframe), axis=1)[both]
+    # A pixel of the first view is 1.3 mm.
+    assert np.median(apart) < 0.0007
+    assert apart.max() < 0.002
+    # As (0.45 - 0.04) / (0.25 - 0.04) squared on the higher box.
+    assert np.median(near.area[both] / keyframe.area[both]) == pytest.approx((0.41 / 0.21) ** 2, rel=0.1)
+
+
+def test_seen_again_it_is_cut_as_it_was(keyframe):
+    near = again(keyframe, nearer()[0])
+    np.testing.assert_array_equal(near.borders, keyframe.borders)
+    np.testing.assert_array_equal(near.length, keyframe.length)
+    np.testing.assert_array_equal(near.over, keyframe.over)
+    assert near.count == keyframe.count
+
+
+def test_seen_again_points_have_the_new_frame_s_gray_values_and_where_there_is_none_the_old_depth(keyframe):
+    frame, label = nearer()
+    blind = replace(frame, depth=np.where(label == 1, np.float32(0), frame.depth))
+    near = again(keyframe, blind)
+    v, u = near.points.pixel
+    np.testing.assert_array_equal(near.gray, frame.gray[v, u])
+    np.testing.assert_allclose(near.points.depth, frame.depth[v, u], atol=1e-4)
+    assert (label[v, u] == 1).sum() > 1000
+
+
+def test_seen_again_what_the_robot_hides_or_stands_elsewhere_is_of_no_superpixel(keyframe):
+    robot = np.zeros(keyframe.frame.depth.shape, bool)
+    robot[:, :100] = True
+    frame, _ = nearer(robot=robot)
+    assert not again(keyframe, frame).image_of(np.ones(keyframe.count, np.uint8))[robot].any()
+    # The second box was taken away: the table is 20 mm behind what was its top.
+    frame, label = nearer([PLACES[0], planar(0.5, 0.5)])
+    near = again(keyframe, frame)
+    shown = near.image_of(np.ones(near.count, np.uint8)) > 0
+    assert np.count_nonzero(shown & (label == 0)) < 0.05 * np.count_nonzero(shown)

@@ -1,5 +1,6 @@
 """Labels carried from view to view, on boxes drawn with exact depth."""
 
+import cv2
 import numpy as np
 import pytest
 
@@ -50,9 +51,13 @@ def test_labels_are_drawn_without_gaps_where_a_nearer_camera_measures_nothing() 
     there = [move(PLACES[0], 0.006, 0.012, 0.1), *PLACES[1:]]
     pair, label_0, label_1 = DrawnScene(SIZES).pair((looking_down(), looking_down(z=0.3)), (PLACES, there))
     motions = {1: motion_seen_from(pair.reference.X_WC, PLACES[0], there[0])}
-    out = draw_labels(pair.reference, pair.current, label_0, motions)
+    out, depth = draw_labels(pair.reference, pair.current, label_0, motions)
     for number in (1, 2, 3):
         assert intersection_over_union(out == number, label_1 == number) > 0.95
+        # The boxes' tops are level; a gap has the depth of what is beside it.
+        top = cv2.erode((out == number).astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
+        np.testing.assert_allclose(depth[top], pair.current.depth[top], atol=3e-4)
+    np.testing.assert_array_equal(depth > 0, out > 0)
 
 
 def test_of_what_is_drawn_the_nearest_is_seen_and_what_is_behind_the_camera_is_not() -> None:
@@ -61,7 +66,7 @@ def test_of_what_is_drawn_the_nearest_is_seen_and_what_is_behind_the_camera_is_n
     def drawn(p_C: list[float]) -> np.ndarray:
         motion = np.eye(4)
         motion[:3, 3] = p_C
-        return draw_labels(frame, frame, label, {1: motion})
+        return draw_labels(frame, frame, label, {1: motion})[0]
 
     onto_2 = PLACES[1][:2, 3] - PLACES[0][:2, 3]
     for dz, visible in ((-0.1, True), (0.1, False)):  # C looks down, so y is turned

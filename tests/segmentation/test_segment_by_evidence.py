@@ -147,3 +147,37 @@ def test_a_thing_that_leaves_its_place_unseen_in_motion_is_no_reason_to_decide_b
     for i in (1, 2):
         ids = np.unique(segmentation.mask[label == i])
         assert intersection_over_union(segmentation.mask == ids.max(), label == i) > 0.95
+
+
+def pushed_from_nearby(blind: bool) -> tuple[list, list]:
+    """A blank box is pushed by an arm whose camera has come near, and goes back: answers and labels."""
+    scene = DrawnScene([(0.06, 0.05, 0.08), (0.06, 0.08, 0.03)], [Blank(150.0), Texture(1)])
+    watcher, rng = Watcher(), np.random.default_rng(0)
+    cameras = [(0.0, 0.5)] * 2 + [(0.0, 0.4), (0.02, 0.32)] + [(0.02, 0.3)] * 10 + [(0.0, 0.5)] * 4
+    steps = [0] * 6 + [1, 2, 3, 4, 5, 6] + [6] * 6
+    answers, labels = [], []
+    for sequence, ((x, z), step) in enumerate(zip(cameras, steps, strict=True)):
+        places = [planar(0.02, 0.002 * step), planar(0.12, 0.0)]
+        frame, label = scene.frame(sequence, looking_down(x, 0.002 * step, z), places, rng)
+        if blind:  # as a camera that measures from 0.3 m on
+            frame = replace(frame, depth=np.where(frame.depth < 0.28, np.float32(0), frame.depth))
+        answers.append(watcher.take(frame).segmentation)
+        labels.append(label)
+    return answers, labels
+
+
+@pytest.mark.parametrize("blind", [False, True], ids=["with depth", "too near for depth"])
+def test_a_blank_body_is_followed_from_nearby_by_how_it_looked_before_it_moved(blind) -> None:
+    answers, labels = pushed_from_nearby(blind)
+    for answer, label in list(zip(answers, labels, strict=True))[11:]:
+        assert intersection_over_union(answer.mask > 0, label == 1) > 0.9
+
+
+def test_the_keyframe_is_seen_again_once_the_camera_has_come_near_and_until_the_next_rest_decides() -> None:
+    answers, _ = pushed_from_nearby(True)
+    seen = [None if a.near is None else a.near.frame.sequence for a in answers]
+    # Frame 4 is the first that looks from where frame 5 does; the body moves from frame 6 on.
+    assert seen[:6] == [None] * 5 + [5]
+    assert set(seen[6:-2]) == {5}
+    assert answers[-1].near is None
+    assert answers[-1].belief.keyframe.frame.sequence > 14

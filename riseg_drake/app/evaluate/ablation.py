@@ -39,6 +39,7 @@ WITHOUT: dict[str, Switch] = {
     "no borders across gaps": {"segment.evidence.belief.keyframe.gap": 0.0},
     "no evidence kept from one rest to the next": {"segment.evidence.belief.most": 0.0},
     "no memory of what left the view": {"segment.evidence.memory": False},
+    "no keyframe seen again from nearby": {"segment.evidence.creep": 0.0},
 }
 """What line 7 by evidence consists of, by what is missing."""
 

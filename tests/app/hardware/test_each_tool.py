@@ -1,6 +1,7 @@
 """What the commands of a real robot ask of the arm before they move it, with each tool and either camera."""
 
 import io
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -46,7 +47,7 @@ def test_hand_eye_has_free_ways_between_its_postures(scenario, arm):
     config = scenario.hardware
     postures = (_postures if config.camera.fixed_pose is None else _postures_in_view)(arm, config)
     assert len(postures) > 3
-    for q_from, q_to in zip(postures, postures[1:], strict=False):
+    for q_from, q_to in pairwise(postures):
         motion = straight_motion(arm, q_from, q_to, planned_limits(scenario))  # raises where it is not free
         for t in np.linspace(0, motion.end_time(), 20):
             q = motion.value(t)[:, 0]
