@@ -128,5 +128,5 @@ def rectangle(p_W: NDArray, direction_W: NDArray, along: NDArray, across: NDArra
 
 
 def steps(start: float, stop: float, table: TableMap) -> NDArray[np.float64]:
-    """Values from start to stop, both included, no further apart than the map's cells."""
+    """Values [N] from start to stop, m, both included, no further apart than the map's cells."""
     return np.linspace(start, stop, int(np.ceil((stop - start) / table.cell)) + 1)

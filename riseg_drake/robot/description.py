@@ -146,7 +146,7 @@ def add_panda(
 
 
 def check_tool(description: PandaDescription, X_WC: NDArray[np.float64] | None = None) -> None:
-    """Raise ToolError for a tool that is none, or that lacks the camera which is on it without `X_WC`."""
+    """Raise ToolError for a tool that is none, or that lacks the camera which is on it without X_WC [4, 4]."""
     plant, scene_graph = MultibodyPlant(0.0), SceneGraph()
     plant.RegisterAsSourceForSceneGraph(scene_graph)
     parser = Parser(plant)

@@ -100,7 +100,10 @@ class PandaKinematics:
 
     @property
     def X_EC(self) -> NDArray[np.float64]:
-        """Pose of the camera on the tool, [4, 4]; of no meaning where it is fixed to the world."""
+        """Pose of the camera on the tool, [4, 4]; of no meaning where it is fixed to the world.
+
+        Raises ToolError where it should be on the tool and is not.
+        """
         if self._X_EC is None:
             raise ToolError(f"{self._tool_name}: {NO_CAMERA}")
         return self._X_EC
