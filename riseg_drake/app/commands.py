@@ -137,7 +137,7 @@ def bench(chosen: argparse.Namespace, console: Console) -> None:
         return bench_stops(console)
     from riseg_drake.app.bench.command import bench_command
 
-    bench_command(chosen.scenario, chosen.seed, chosen.stream, chosen.sam, console)
+    bench_command(chosen.scenario, chosen.seed, chosen.stream, chosen.sam, chosen.json, console)
 
 
 def doctor(chosen: argparse.Namespace, console: Console) -> int:

@@ -34,6 +34,7 @@ def add_bench_options(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--seed", type=seed_number, default=0, metavar="N", help="draws the scene and the noise (0)"
     )
+    command.add_argument("--json", type=Path, metavar="FILE", help="also write all figures")
     command.add_argument(
         "--stream",
         type=positive,
