@@ -8,7 +8,6 @@ import pytest
 
 from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.pushing.push_path import PlannedSpeed, PushPathParameters, plan_push_path
-from riseg_drake.pushing.pusher import Pusher
 from riseg_drake.robot.command_limiter import CommandLimits
 from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import PandaKinematics, observe_pose
@@ -51,7 +50,7 @@ def targets(kinematics, q_observe):
         tallest=0.08,
         cost=0.0,
     )
-    path = plan_push_path(push, kinematics, q_observe, Pusher(), PATH)
+    path = plan_push_path(push, kinematics, q_observe, PATH)
     times = np.arange(0, path.trajectory.end_time() + 1.0, 0.01).clip(0, path.trajectory.end_time())
     return np.array([path.trajectory.value(time)[:, 0] for time in times])
 

@@ -26,7 +26,7 @@ class PairTimes:
     be avoided."""
 
     def book(self, seconds: float, *, moves: bool) -> None:
-        """One more pair, in which something moves or not."""
+        """One more pair, that took `seconds`, s; something moves in it or not."""
         (self.moving if moves else self.still).append(seconds)
 
     def measure_flow(self, color_0: NDArray[np.uint8], color_1: NDArray[np.uint8]) -> None:

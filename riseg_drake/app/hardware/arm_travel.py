@@ -60,8 +60,8 @@ class WayBack:
     """To where the arm looks from, from wherever somebody has put it: planned by one, begun by another."""
 
     ABOVE = 0.25
-    """Things on the table are lower than this, m, or the pusher would be too short for them: the tip goes so
-    high before it goes anywhere else ..."""
+    """Things on the table are taken to be lower than this, m: the tip goes so high before it goes anywhere
+    else ..."""
     RISE, HIGHEST = 0.02, 0.5
     """... and up to the other height where the straight way is not free before, each time by the one, m."""
 

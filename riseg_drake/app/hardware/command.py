@@ -235,7 +235,7 @@ class _Session:
         with ExitStack() as stack:
             status = stack.enter_context(self._console.status("looking"))
             narrator, clock = Narrator(self._console, status), StageClock()
-            robot = PandaKinematics(self._config.panda)
+            robot = PandaKinematics(self._config.panda, self._config.camera.fixed_pose)
             log = stack.enter_context(self._timeline.opened(self._folder.path.name, robot))
             listeners = [
                 lambda *_: narrator.follow(self._progress),
