@@ -22,6 +22,7 @@ from riseg_drake.robot.kinematics import READY, PandaKinematics, observe_pose, t
 from riseg_drake.robot.silhouette import NEAR, RobotSilhouette, UnknownShapeError, hull_corners
 
 D415 = Intrinsics(640, 480, 616.285, 615.778, 301.418, 232.864)
+D405 = Intrinsics(640, 480, 433.0, 433.0, 319.5, 239.5)
 
 
 @pytest.fixture(scope="module")
@@ -30,14 +31,19 @@ def rendered_robot():
     return renderer_of_robot()
 
 
-def renderer_of_robot(X_WC=None):
-    """The same, for a camera fixed to the world at X_WC."""
+@pytest.fixture(scope="module")
+def hand():
+    return PandaKinematics(PandaDescription(tool="hand"))
+
+
+def renderer_of_robot(X_WC=None, tool="bar", camera=D415):
+    """The same, for a camera fixed to the world at X_WC, for another tool, and for another camera."""
     builder = RobotDiagramBuilder(time_step=0.0)
     plant, scene_graph = builder.plant(), builder.scene_graph()
-    frame = add_panda(plant, PandaDescription(), X_WC).camera_frame
+    frame = add_panda(plant, PandaDescription(tool=tool), X_WC).camera_frame
     plant.Finalize()
     scene_graph.AddRenderer("vtk", MakeRenderEngineVtk(RenderEngineVtkParams()))
-    k = D415
+    k = camera
     core = RenderCameraCore(
         "vtk",
         CameraInfo(k.width, k.height, k.fx, k.fy, k.cx, k.cy),
@@ -89,6 +95,17 @@ def test_with_margin_the_silhouette_covers_every_rendered_pixel_and_little_else(
         drawn, true = silhouette.mask(q), rendered_robot(q)
         assert (drawn & true).sum() == true.sum()
         assert (drawn & true).sum() / (drawn | true).sum() > 0.75
+
+
+@pytest.mark.renders
+def test_the_hand_is_drawn_where_drake_renders_it(hand):
+    rendered = renderer_of_robot(tool="hand", camera=D405)
+    bare, wide = RobotSilhouette(hand, D405, 0.0, 0.0), RobotSilhouette(hand, D405)
+    for q in postures(hand):
+        true = rendered(q)
+        assert true.any()
+        assert (bare.mask(q) & true).sum() / (bare.mask(q) | true).sum() > 0.96
+        assert (wide.mask(q) & true).sum() == true.sum()
 
 
 @pytest.mark.renders

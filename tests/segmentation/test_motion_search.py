@@ -9,14 +9,13 @@ from pydrake.math import RigidTransform, RotationMatrix
 from riseg_drake.segmentation import motion_search
 from riseg_drake.segmentation.belief import BeliefParameters, first_belief
 from riseg_drake.segmentation.comparison import Comparison
-from riseg_drake.segmentation.likelihood import motion_costs
+from riseg_drake.segmentation.likelihood import motion_costs, unexplained_parts
 from riseg_drake.segmentation.motion_search import (
     MotionSearchParameters,
     SearchProblem,
     _Search,
     missing_motion,
     search_motions,
-    unexplained_parts,
 )
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.noise import MeasurementNoise
