@@ -208,14 +208,20 @@ def test_across_a_gap_all_of_both_parts_says_what_they_are_and_elsewhere_each_su
 def test_a_new_keyframe_knows_its_superpixels_by_what_the_old_ones_carry_and_what_is_remembered(
     monkeypatch, watched
 ):
-    """Four superpixels: the old 0, which stood, the old 1, body 5, which moved, 7 of memory, and nothing."""
+    """Four superpixels: the old 0, body 5, which moved, 1, which stood, 7 of memory, and nothing; 2 is gone."""
     of_the_old = np.tile(np.array([1, 2, 0, UNKNOWN], np.uint16), (2, 1))
     remembered = np.tile(np.array([0, 9, 7, UNKNOWN], np.uint16), (2, 1))
     evidence = np.array([11.5, -11.5, 1.0])
     old = Belief(
-        SimpleNamespace(count=2), np.zeros(3), evidence, np.array([0, 1]), 6, np.arange(2), np.arange(2)[None]
+        SimpleNamespace(count=3),
+        np.zeros(3),
+        evidence,
+        np.array([0, 1, 0]),
+        6,
+        np.arange(3),
+        np.arange(3)[None],
     )
-    bodies = Bodies(np.array([0, 5]), np.array([0, 1]), STILL_AND_MOVED, 8)
+    bodies = Bodies(np.array([5, 0, 6]), np.array([1, 0, 1]), STILL_AND_MOVED, 8)
     new = SimpleNamespace(
         superpixels=SimpleNamespace(label=np.tile(np.arange(4), (2, 1))),
         region=(slice(0, 2), slice(0, 4)),
@@ -243,19 +249,19 @@ def test_a_new_keyframe_knows_its_superpixels_by_what_the_old_ones_carry_and_wha
     monkeypatch.setattr(module, "partition", lambda keyframe, bond, parameters: np.array([0, 1, 2, 2]))
     seen = SimpleNamespace(evidence=np.array([2.0, -2.0, 0.25])) if watched else None
     belief = next_belief(old, seen, bodies, None, None, remembered, None, BeliefParameters())
-    assert given["label"] == [1, 2]
-    assert list(given["moves"]) == [2]
-    np.testing.assert_array_equal(given["moves"][2], STILL_AND_MOVED[1])
-    np.testing.assert_array_equal(given["ids"], np.tile([0, 5, 7, 0], (2, 1)))
+    assert given["label"] == [1, 2, 3]
+    assert list(given["moves"]) == [1, 3]
+    np.testing.assert_array_equal(given["moves"][1], STILL_AND_MOVED[1])
+    np.testing.assert_array_equal(given["ids"], np.tile([5, 0, 7, 0], (2, 1)))
     origin = given["origin"]
     assert origin.source.tolist() == [0, 1, -1, -1]
-    assert origin.body.tolist() == [0, 5, 7, 0]
-    assert origin.moved.tolist() == [False, True, False, False]
+    assert origin.body.tolist() == [5, 0, 7, 0]
+    assert origin.moved.tolist() == [True, False, False, False]
     # What was seen adds up to no more than 12 nats either way.
     np.testing.assert_array_equal(given["old"].evidence, [12.0, -12.0, 1.25] if watched else evidence)
-    np.testing.assert_array_equal(given["old"].body, [0, 5])
+    np.testing.assert_array_equal(given["old"].body, [5, 0, 6])
     assert belief.keyframe is new
     assert (belief.prior.tolist(), belief.evidence.tolist(), belief.next_id) == ([1.0], [0.5], 8)
     # What nothing is known of is of the part that it is in.
-    assert belief.body.tolist() == [0, 5, 7, 7]
+    assert belief.body.tolist() == [5, 0, 7, 7]
     assert belief.finer.shape == (3, 4)
