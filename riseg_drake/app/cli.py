@@ -23,7 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Of a library that only evaluations with several jobs use, and these say it themselves.
     warnings.filterwarnings("ignore", message=".*joblib will operate in serial mode", category=UserWarning)
     code = 0
-    with stopped_by_signals(commands.__file__) as stop:
+    with stopped_by_signals(commands.__file__, __file__) as stop:
         try:
             code = chosen.call(chosen, Console(markup=False)) or 0  # what is said may hold anybody's brackets
         except KeyboardInterrupt as interrupt:

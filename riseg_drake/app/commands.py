@@ -135,9 +135,13 @@ def bench(chosen: argparse.Namespace, console: Console) -> None:
         from riseg_drake.app.bench.stop import bench_stops
 
         return bench_stops(console)
+    if chosen.driver:
+        from riseg_drake.app.bench.driver import bench_driver
+
+        return bench_driver(console)
     from riseg_drake.app.bench.command import bench_command
 
-    bench_command(chosen.scenario, chosen.seed, chosen.stream, chosen.sam, console)
+    bench_command(chosen.scenario, chosen.seed, chosen.stream, chosen.sam, chosen.json, console)
 
 
 def doctor(chosen: argparse.Namespace, console: Console) -> int:

@@ -30,6 +30,7 @@ from riseg_drake.pushing.arm_path import ArmPhase
 from riseg_drake.pushing.decision import Decision
 from riseg_drake.pushing.push import Push
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture
+from riseg_drake.robot.tool_shape import ToolShape
 from riseg_drake.segmentation.segmentation import Segmentation
 from riseg_drake.stations.hardware import HardwareStation, TargetSink
 from riseg_drake.stations.lcm_reception import Reception
@@ -217,7 +218,9 @@ def make_diagram(
     builder.Connect(arm.GetOutputPort("position"), station.GetInputPort("panda.position"))
     refiner = add_refinement(builder, scenario, segmentation, arm)
     if meshcat is not None:
-        view = builder.AddSystem(MeshcatView(meshcat, 1 / config.camera.rate, _stage(scenario)))
+        view = builder.AddSystem(
+            MeshcatView(meshcat, 1 / config.camera.rate, _stage(scenario, kinematics.tool))
+        )
         for name in ("pair", "segmentation"):
             builder.Connect(segmentation.outputs[name], view.GetInputPort(name))
         for name in ("active_push", "interaction_step", "phase"):
@@ -237,9 +240,9 @@ def make_diagram(
     return WiredDiagram(diagram, station, [*segmentation.stages, planner, arm], scenario, refiner)
 
 
-def _stage(scenario: Scenario) -> Stage:
+def _stage(scenario: Scenario, tool: ToolShape) -> Stage:
     """What stands around the view; a simulation draws its table and things itself."""
-    config, pusher = scenario.station, scenario.push.action.pusher
+    config = scenario.station
     if not isinstance(config, SimulatedStationConfig):
-        return Stage(config.centre_W, pusher)
-    return Stage(config.scene.centre_W, pusher, has_things=True)
+        return Stage(config.centre_W, tool)
+    return Stage(config.scene.centre_W, tool, has_things=True)

@@ -34,6 +34,7 @@ def add_bench_options(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--seed", type=seed_number, default=0, metavar="N", help="draws the scene and the noise (0)"
     )
+    command.add_argument("--json", type=Path, metavar="FILE", help="also write all figures")
     command.add_argument(
         "--stream",
         type=positive,
@@ -42,6 +43,9 @@ def add_bench_options(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument(
         "--stops", action="store_true", help="measure instead how soon a moving arm stands still, over LCM"
+    )
+    command.add_argument(
+        "--driver", action="store_true", help="measure a cycle of `riseg drive-arm` instead, without an arm"
     )
     command.add_argument("--raft", action="store_true", help="measure RAFT instead, small and large")
     command.add_argument(

@@ -1,11 +1,11 @@
-"""A push as it stands in Meshcat's scene: an arrow, and what the pusher sweeps on the table."""
+"""A push as it stands in Meshcat's scene: an arrow, and what the tool's tip sweeps on the table."""
 
 import numpy as np
 from pydrake.geometry import Box, Cylinder, Meshcat, MeshcatCone, Rgba
 from pydrake.math import RigidTransform, RotationMatrix
 
 from riseg_drake.pushing.push import Push
-from riseg_drake.pushing.pusher import Pusher
+from riseg_drake.robot.tool_shape import ToolShape
 
 ARROW_RADIUS = 0.004  # m
 ARROW_RUN_UP = 0.08
@@ -18,10 +18,10 @@ SWEPT_THICKNESS = 0.001
 """Of what is drawn on the table, m."""
 
 
-def draw_push(meshcat: Meshcat, path: str, push: Push, pusher: Pusher) -> None:
-    """The push as an arrow at `path`/arrow, and the rectangle that the bar sweeps at `path`/swept."""
+def draw_push(meshcat: Meshcat, path: str, push: Push, tool: ToolShape) -> None:
+    """The push as an arrow at `path`/arrow, and the rectangle that the tip sweeps at `path`/swept."""
     draw_arrow(meshcat, f"{path}/arrow", push)
-    draw_swept(meshcat, f"{path}/swept", push, pusher)
+    draw_swept(meshcat, f"{path}/swept", push, tool)
 
 
 def draw_arrow(meshcat: Meshcat, path: str, push: Push) -> None:
@@ -40,12 +40,12 @@ def draw_arrow(meshcat: Meshcat, path: str, push: Push) -> None:
     meshcat.SetTransform(f"{path}/head", RigidTransform(against, tip))
 
 
-def draw_swept(meshcat: Meshcat, path: str, push: Push, pusher: Pusher) -> None:
-    """The rectangle under which the bar goes forward, from behind its first to before its last place."""
+def draw_swept(meshcat: Meshcat, path: str, push: Push, tool: ToolShape) -> None:
+    """The rectangle under which the tip goes forward, from behind its first to before its last place."""
     forward, sideward = push.direction_W, np.array([-push.direction_W[1], push.direction_W[0]])
     middle = push.p_WE[:2] + push.length / 2 * forward
     below = push.p_WE[2] - push.tip_height + SWEPT_THICKNESS
     X_WS = np.eye(4)
     X_WS[:2, 0], X_WS[:2, 1], X_WS[:3, 3] = forward, sideward, [*middle, below]
-    meshcat.SetObject(path, Box(push.length + pusher.thickness, pusher.width, SWEPT_THICKNESS), SWEPT_COLOR)
+    meshcat.SetObject(path, Box(push.length + tool.thickness, tool.width, SWEPT_THICKNESS), SWEPT_COLOR)
     meshcat.SetTransform(path, RigidTransform(X_WS))

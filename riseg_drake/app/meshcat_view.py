@@ -7,7 +7,7 @@ recording keeps when it is visible.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -34,7 +34,7 @@ from riseg_drake.pictures.masks import draw_masks
 from riseg_drake.pictures.object_colors import object_colors
 from riseg_drake.pushing.arm_path import ArmPhase
 from riseg_drake.pushing.push import NO_PUSH, Push
-from riseg_drake.pushing.pusher import Pusher
+from riseg_drake.robot.tool_shape import ToolShape
 from riseg_drake.segmentation.segmentation import Segmentation, nothing_segmented
 
 POINT_COLUMNS = 213
@@ -60,7 +60,7 @@ class Stage:
 
     centre_W: Sequence[float]
     """Middle of the work area on the table, x and y, m."""
-    pusher: Pusher = field(default_factory=Pusher)
+    tool: ToolShape
     has_things: bool = False
     """Whether something else draws table and things, so that the points need to be those of the masks only."""
 
@@ -172,7 +172,7 @@ class MeshcatView(LeafSystem):
             self._push = push
             path = f"/riseg/push/step_{step}" if push is not NO_PUSH else ""
             if push is not NO_PUSH:
-                draw_push(self._meshcat, path, push, self._stage.pusher)
+                draw_push(self._meshcat, path, push, self._stage.tool)
             self._turn_to("push", path, time)
         return EventStatus.Succeeded()
 

@@ -8,6 +8,8 @@ from riseg_drake.app.flow_method import OpticalFlowParameters
 from riseg_drake.app.scenario_file import ScenarioError, parse_scenario, read_scenario
 from riseg_drake.learned.sam import SamParameters
 from riseg_drake.pushing.push_planning import PushPlanningParameters
+from riseg_drake.robot.description import check_tool
+from riseg_drake.robot.tool import OWN_TOOLS, ToolError
 from riseg_drake.segmentation.above_table import AboveTableParameters
 from riseg_drake.segmentation.algorithm import SegmentObjsParameters
 from riseg_drake.segmentation.bfif import BFIFParameters
@@ -78,11 +80,24 @@ class Scenario:
 
 
 def load_scenario(path: Path | None, otherwise: str = BUILT_IN) -> Scenario:
-    """The scenario of a file, or a built-in one. Raises ScenarioError."""
+    """The scenario of a file, or a built-in one. Raises ScenarioError, also for a tool that is none."""
     if path is not None:
-        return read_scenario(path, Scenario)
+        return with_tool(read_scenario(path, Scenario), path)
     built_in = files("riseg_drake.diagrams") / f"{otherwise}.yaml"
     return parse_scenario(built_in.read_text(encoding="utf-8"), Scenario, source=built_in.name)
+
+
+def with_tool(scenario: Scenario, path: Path) -> Scenario:
+    """A scenario of a file whose tool, where it is a file, is read from beside it. Raises ScenarioError."""
+    panda = scenario.station.panda
+    if panda.tool not in OWN_TOOLS:
+        # Wherever the scenario is copied to, such as into a recording, it is the same file.
+        panda.tool = str((path.parent / panda.tool).resolve())
+        try:
+            check_tool(panda, scenario.station.camera.fixed_pose)
+        except ToolError as error:
+            raise ScenarioError(f"{path}: station.panda.tool: {error}") from None
+    return scenario
 
 
 def scenario_name(path: Path | None, otherwise: str = BUILT_IN) -> str:

@@ -9,7 +9,7 @@ import ctypes
 import os
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
@@ -45,17 +45,18 @@ _held = _Held()
 
 
 @contextmanager
-def stopped_by_signals(loader: str) -> Iterator[Stop]:
+def stopped_by_signals(*loaders: str) -> Iterator[Stop]:
     """For the time of a `with`, every stop signal raises KeyboardInterrupt; the Stop says which came.
 
-    While a function of the file `loader` imports its modules the process ends at once instead: nothing has
-    been begun, and what is raised in a module of C++ comes out as an ImportError, or not at all.
+    While a function of one of the files `loaders` imports its modules the process ends at once instead: nothing
+    has been begun, or all is over, and what is raised in a module of C++ comes out as an ImportError, or not at
+    all.
     """
     stop = Stop()
 
     def hear(number: int, frame: FrameType | None) -> None:
         stop.signal = stop.signal or number
-        if _is_loading(frame, loader):
+        if _is_loading(frame, loaders):
             os.write(2, b"riseg: stopped\n")
             os._exit(stop.exit_code)
         if _held.depth:
@@ -119,12 +120,12 @@ def end_with_parent(parent: int) -> None:
         os._exit(1)
 
 
-def _is_loading(frame: FrameType | None, loader: str) -> bool:
-    """Whether the outermost import that is under way was begun by a function of the file `loader`."""
+def _is_loading(frame: FrameType | None, loaders: Sequence[str]) -> bool:
+    """Whether the outermost import that is under way was begun by a function of one of the files `loaders`."""
     outermost = None
     while frame is not None:
         importer = frame.f_back
         if frame.f_code.co_filename == _IMPORT and importer and importer.f_code.co_filename != _IMPORT:
             outermost = importer.f_code.co_filename
         frame = importer
-    return outermost == loader
+    return outermost in loaders

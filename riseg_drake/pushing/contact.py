@@ -1,6 +1,6 @@
-"""Where the bar touches a cluster, how low it must be there, and what else it would sweep through.
+"""Where the tip touches a cluster, how low it must be there, and what else it would sweep through.
 
-The paper pushes at a boundary point. A bar has a width: coming along bc it touches the cluster first
+The paper pushes at a boundary point. A tip has a width: coming along bc it touches the cluster first
 wherever the outline protrudes most within that width.
 """
 
@@ -22,19 +22,19 @@ class Contacts:
     """Of N candidates: the contact, and whether the way to it and through the push is clear."""
 
     b_W: NDArray[np.float64]
-    """[N, 2], the middle of the bar's face when it touches, on the line through boundary point and c."""
+    """[N, 2], the middle of the tip's face when it touches, on the line through boundary point and c."""
     height: NDArray[np.float64]
-    """[N], how high the object is where it is touched, m; 0 where the bar misses."""
+    """[N], how high the object is where it is touched, m; 0 where the tip misses."""
     face: NDArray[np.float64]
-    """[N], share of the bar's width that meets the object within SKIN / 2 of the first contact."""
+    """[N], share of the tip's width that meets the object within SKIN / 2 of the first contact."""
     tip_height: NDArray[np.float64]
-    """[N], height of the bar's end face above the table, m."""
+    """[N], height of the tip's end face above the table, m."""
     high_enough: NDArray[np.bool_]
-    """[N], the bar touches, and need not come closer to the table than it may."""
+    """[N], the tip touches, and need not come closer to the table than it may."""
     only_target: NDArray[np.bool_]
-    """[N], up to the contact the bar meets nothing, and from there on no segmented object."""
+    """[N], up to the contact the tip meets nothing, and from there on no segmented object."""
     beside_target: NDArray[np.float64]
-    """[N], share of what the bar's face moves through that is unsegmented but not of the cluster."""
+    """[N], share of what the tip's face moves through that is unsegmented but not of the cluster."""
     unseen: NDArray[np.float64]
     """[N], share of the way to the contact that the camera could not see."""
     transmitted: NDArray[np.float64]
@@ -52,7 +52,7 @@ def find_contacts(
 ) -> Contacts:
     """The contacts of pushes through N boundary points [N, 2] along unit directions [N, 2].
 
-    Parts of the cluster that the bar's end face passes over at its lowest do not count as contact.
+    Parts of the cluster that the tip's end face passes over at its lowest do not count as contact.
     `target` is the part of the cluster that is to move, if not all of it [rows, columns].
     """
     lowest_object = pusher.lowest_tip_height / pusher.height_share
@@ -112,7 +112,7 @@ def _transmitted(
 ) -> NDArray[np.float64]:
     """Share [N] of a push by `d_push`, m, that arrives at a target behind other things.
 
-    Gaps on the way close up first; and the longer the way through others is than the bar is wide, the sooner
+    Gaps on the way close up first; and the longer the way through others is than the tip is wide, the sooner
     they turn aside.
     """
     farthest = float(np.linalg.norm(table.points(target)[None] - b_W[:, None], axis=2).max())

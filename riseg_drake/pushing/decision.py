@@ -25,7 +25,7 @@ class Ending(Enum):
 
 
 class Criterion(Enum):
-    """What a push must pass to be valid: the paper's three (Alg. 3, line 10), and those of a bar on a table.
+    """What a push must pass to be valid: the paper's three (Alg. 3, line 10), and those of a tool on a table.
 
     Each stands for the function or the field of that name; its value says what is wrong where it fails.
     """
@@ -33,8 +33,9 @@ class Criterion(Enum):
     CENTER_ON_OBJECT = "the cluster's center does not lie on an object"
     ACCESSIBLE = "the area that the end effector needs is not free"
     MOVES_ALONE = "too much of the cluster would be pushed onto other objects"
-    HIGH_ENOUGH = "the bar would have to come too close to the table"
-    ONLY_TARGET = "the bar would meet other things, too"
+    HIGH_ENOUGH = "the tool would have to come too close to the table"
+    ONLY_TARGET = "the tool would meet other things, too"
+    ROOM_BELOW_THE_TOOL = "things are too tall for what of the tool is beside its tip"
     STAYS_IN_WORK_AREA = "the cluster would be driven out of the work area"
     STAYS_ON_TOP = "the cluster would be pushed off what it lies on"
     NOT_IN_VAIN = "too little is to be expected of it, or it was tried before"
@@ -43,7 +44,7 @@ class Criterion(Enum):
 class PathStage(Enum):
     """What the arm must be able to do for a push; its value says what is wrong where it cannot."""
 
-    ROOM_BELOW_THE_FLANGE = "things on the table are as tall as the pusher is long"
+    ROOM_BELOW_THE_FLANGE = "things on the table are as tall as the tool is long"
     POSTURE = "no posture brings the tip behind the object"
     STROKE = "the arm cannot follow the stroke"
     DESCENT = "the arm cannot come straight down behind the object"

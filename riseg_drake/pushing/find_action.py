@@ -18,10 +18,12 @@ from riseg_drake.pushing.gain import GainParameters, expected_gain, most_to_expe
 from riseg_drake.pushing.levels import LevelsParameters, raised
 from riseg_drake.pushing.objects_to_segment import ObjectsToSegmentParameters, things_to_push
 from riseg_drake.pushing.push import NO_PUSH, Push
-from riseg_drake.pushing.pusher import Pusher
+from riseg_drake.pushing.pusher import Pusher, PusherParameters
+from riseg_drake.pushing.room_below import room_below_the_tool
 from riseg_drake.pushing.table_map import TableMap, TableMapParameters
 from riseg_drake.pushing.tried_pushes import KnownScene, times_pushed
 from riseg_drake.pushing.validity import ValidityParameters, is_valid_push, share_after_push
+from riseg_drake.robot.tool_shape import ToolShape
 
 ALIKE_DISTANCE = 0.010
 """Where the arm has no path for a push, it is not asked about another that begins this close to it, m ..."""
@@ -41,7 +43,7 @@ class FindActionParameters:
     clusters: ClustersParameters = field(default_factory=ClustersParameters)
     boundary: BoundaryParameters = field(default_factory=BoundaryParameters)
     validity: ValidityParameters = field(default_factory=ValidityParameters)
-    pusher: Pusher = field(default_factory=Pusher)
+    pusher: PusherParameters = field(default_factory=PusherParameters)
     gain: GainParameters = field(default_factory=GainParameters)
     levels: LevelsParameters = field(default_factory=LevelsParameters)
     paths: int = 30
@@ -51,6 +53,7 @@ class FindActionParameters:
 def find_action(
     known: KnownScene,
     rng: np.random.Generator,
+    tool: ToolShape,
     parameters: FindActionParameters | None = None,
     plan_path: PlanPath | None = None,
 ) -> Decision:
@@ -59,6 +62,7 @@ def find_action(
     Args:
         known: the map, and what was tried.
         rng: for the clustering.
+        tool: what is pushed with.
         parameters: the defaults if None.
         plan_path: the arm's path for a push, or the stage that it cannot do. Without it every push counts
             as reachable and comes without a path.
@@ -91,7 +95,7 @@ def find_action(
         if not to_segment.any() or not (alone or parameters.validity.with_others):
             continue
         for clusters in find_clusters(to_segment, scene, parameters.clusters, rng, scene.doubtful):  # line 6
-            pushes, failed = valid_pushes(clusters, replace(known, table=scene), parameters, alone=alone)
+            pushes, failed = valid_pushes(clusters, replace(known, table=scene), tool, parameters, alone=alone)
             push = search.best(pushes)
             if push is not None:
                 return Decision(push, unsettled_area=area, doubtful_area=doubtful_area)  # lines 11, 12
@@ -141,6 +145,7 @@ class _PathSearch:
 def valid_pushes(
     clusters: Sequence[Cluster],
     known: KnownScene,
+    tool: ToolShape,
     parameters: FindActionParameters,
     *,
     alone: bool = True,
@@ -158,7 +163,7 @@ def valid_pushes(
         if not len(B):
             continue
         valid, fails = valid_pushes_of(  # lines 9, 10
-            B, cluster, pushed, known, parameters, alone=alone
+            B, cluster, pushed, known, tool, parameters, alone=alone
         )
         pushes += valid
         for criterion, which in fails.items():
@@ -173,6 +178,7 @@ def valid_pushes_of(
     cluster: Cluster,
     pushed: NDArray[np.bool_],
     known: KnownScene,
+    tool: ToolShape,
     parameters: FindActionParameters,
     *,
     alone: bool,
@@ -180,11 +186,11 @@ def valid_pushes_of(
     """The valid pushes from boundary points [N, 2], N >= 1, towards the center of their cluster, and which
     candidates [N] fail what.
 
-    Beyond the paper's IsValidPush: the bar touches what is to be `pushed` [rows, columns] before anything
+    Beyond the paper's IsValidPush: the tip touches what is to be `pushed` [rows, columns] before anything
     else, low enough but not too close to the table, and nothing is driven out of the work area. Not `alone`,
     that is more than the cluster, which then need not move alone.
     """
-    validity, pusher, table = parameters.validity, parameters.pusher, known.table
+    validity, pusher, table = parameters.validity, Pusher(tool, parameters.pusher), known.table
     center_W, P = cluster.center_W, cluster.cells
     direction_W = center_W - boundary_W
     direction_W /= np.linalg.norm(direction_W, axis=1, keepdims=True)
@@ -207,6 +213,9 @@ def valid_pushes_of(
         Criterion.MOVES_ALONE: is_valid.moves_alone | (not alone),
         Criterion.HIGH_ENOUGH: contacts.high_enough,
         Criterion.ONLY_TARGET: contacts.only_target & (contacts.transmitted > 0),
+        Criterion.ROOM_BELOW_THE_TOOL: room_below_the_tool(
+            contacts.b_W, direction_W, contacts.tip_height, pushed, table, pusher, validity
+        ),
         Criterion.STAYS_IN_WORK_AREA: stays_in_work_area(direction_W, P, table, validity.d_push),
         Criterion.STAYS_ON_TOP: overhang(direction_W, P, table, validity.d_push) <= validity.l_act,
         Criterion.NOT_IN_VAIN: gain > least,

@@ -22,7 +22,7 @@ class GainParameters:
     object_area: float = 1e-3
     """Half of the things that are this large, m^2, are objects; what is much smaller is a part of one."""
     slips: float = 0.2
-    """Chance that a bar which touches with nothing but a corner slips off."""
+    """Chance that a tip which touches with nothing but a corner slips off."""
     unseen: float = 0.3
     """Chance that something stands on a way that the camera could not see."""
     turning: float = 0.3

@@ -1,7 +1,7 @@
 """What lies on other things, seen for itself: the map above a level.
 
 Things that lie on each other move as one when the lowest of them is pushed. Above the level of what carries it,
-the upper one is a thing on a table of its own: all of Alg. 3 holds there, and the bar passes over the rest.
+the upper one is a thing on a table of its own: all of Alg. 3 holds there, and the tip passes over the rest.
 """
 
 from collections.abc import Iterator
@@ -19,9 +19,9 @@ class LevelsParameters:
     """Which steps are seen as the edge of what lies on something (none of it in the paper)."""
 
     step: float = 0.010
-    """m; the least step of height: what the bar needs to meet the upper thing, and to pass over the lower."""
+    """m; the least step of height: what the tip needs to meet the upper thing, and to pass over the lower."""
     over: float = 0.004
-    """m; the level lies so much above what the bar is to pass over, whose depth errs."""
+    """m; the level lies so much above what the tip is to pass over, whose depth errs."""
 
 
 _APART = 3

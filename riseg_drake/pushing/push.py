@@ -14,14 +14,14 @@ class Push(Immutable):
     """a_i = (b, bc, d_push), as the robot will do it."""
 
     p_WE: NDArray[np.float64]
-    """[3], where the tip E is lowered to, `clearance` (and half the bar) behind the contact, m."""
+    """[3], where the tip E is lowered to, `clearance` (and half the tip) behind the contact, m."""
     tip_height: float
     """Height of the tip during the push above the table, or above what carries the target where that lies on
     other things, m."""
     direction_W: NDArray[np.float64]
     """[2], unit vector bc on the table."""
     p_WB: NDArray[np.float64]
-    """[3], the contact b on the bar's face, m; an arrow goes from here along the direction."""
+    """[3], the contact b on the tip's face, m; an arrow goes from here along the direction."""
     length: float
     """How far E travels forward, m: the clearance and d_push."""
     d_push: float

@@ -16,7 +16,6 @@ from scipy.spatial.transform import Rotation
 from riseg_drake.pushing.arm_path import PushPath
 from riseg_drake.pushing.decision import PathStage
 from riseg_drake.pushing.push import Push
-from riseg_drake.pushing.pusher import Pusher
 from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest, steady_speed
 from riseg_drake.robot.kinematics import (
     LIMIT_MARGIN,
@@ -75,7 +74,7 @@ class PushPathParameters:
     joint_step: float = 0.25
     """No joint may turn more than this between two of those poses, rad: beyond, it would be a leap."""
     min_clearance: float = MIN_CLEARANCE
-    """Room that arm, pusher and camera keep to the table and to each other, m; half the tip's height where that
+    """Room that arm, tool and camera keep to the table and to each other, m; half the tip's height where that
     is less, so that low things can be pushed."""
 
 
@@ -83,16 +82,15 @@ def plan_push_path(
     push: Push,
     kinematics: PandaKinematics,
     q_observe: NDArray,
-    pusher: Pusher,
     parameters: PushPathParameters | None = None,
 ) -> PushPath | PathStage:
     """The path of a push from the posture q_observe [7] and back to it, or what the arm cannot do of it.
 
     Joint limits, table, and the arm's own parts are looked at along all of it. Objects need no look:
-    what the bar sweeps at their height was found free on the map, and the rest goes on above them.
+    what the tip sweeps at their height was found free on the map, and the rest goes on above them.
     """
     parameters = parameters or PushPathParameters()
-    if push.tallest > pusher.length - parameters.arm_room:
+    if push.tallest > kinematics.tool.length - parameters.arm_room:
         return PathStage.ROOM_BELOW_THE_FLANGE
     ahead_W = np.append(push.direction_W, 0.0)
     yaw = float(np.arctan2(push.direction_W[1], push.direction_W[0]))

@@ -58,9 +58,9 @@ def plan_push(
     known = KnownScene(table, tried, _heading(kinematics, q_observe))
 
     def path_of(push: Push) -> PushPath | PathStage:
-        return plan_push_path(push, kinematics, q_observe, parameters.action.pusher, parameters.path)
+        return plan_push_path(push, kinematics, q_observe, parameters.path)
 
-    return find_action(known, rng, parameters.action, path_of)
+    return find_action(known, rng, kinematics.tool, parameters.action, path_of)
 
 
 def _heading(kinematics: PandaKinematics, q_observe: NDArray) -> NDArray[np.float64] | None:

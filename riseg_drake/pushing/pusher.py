@@ -1,20 +1,16 @@
-"""The end effector as a push needs to know it: a vertical bar with a rectangular cross section."""
+"""The end effector as a push needs to know it: a vertical tip, rectangular from below."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from riseg_drake.robot.tool_shape import Overhang, ToolShape
 
 
 @dataclass
-class Pusher:
-    """The bar on the flange, and where its lower end goes. E is the centre of its end face."""
+class PusherParameters:
+    """Where the tool's lower end goes, and what room it is given."""
 
-    thickness: float = 0.020
-    """Extent along E's x, the push direction, m."""
-    width: float = 0.030
-    """Extent along E's y, m."""
-    length: float = 0.30
-    """From the flange to the end face, m."""
     margin: float = 0.005
-    """Room that must be left around the bar, m."""
+    """Room that must be left around the tool, m."""
     tip_height: float = 0.008
     """Height of the end face above the table during a push, m, unless the object is too low for it."""
     lowest_tip_height: float = 0.002
@@ -23,3 +19,51 @@ class Pusher:
     height_share: float = 0.45
     """The end face is at most at this share of the object's height where it is touched, so that even
     something round is met at or below its widest level."""
+
+
+@dataclass(frozen=True)
+class Pusher:
+    """A tool with these. E is the centre of its end face."""
+
+    tool: ToolShape
+    parameters: PusherParameters = field(default_factory=PusherParameters)
+
+    @property
+    def thickness(self) -> float:
+        """Extent of the tip along E's x, the push direction, m."""
+        return self.tool.thickness
+
+    @property
+    def width(self) -> float:
+        """Extent of the tip along E's y, m."""
+        return self.tool.width
+
+    @property
+    def length(self) -> float:
+        """From the flange to the end face, m."""
+        return self.tool.length
+
+    @property
+    def overhangs(self) -> tuple[Overhang, ...]:
+        """What is beside the tip further up, lowest first."""
+        return self.tool.overhangs
+
+    @property
+    def margin(self) -> float:
+        """Room that must be left around the tool, m."""
+        return self.parameters.margin
+
+    @property
+    def tip_height(self) -> float:
+        """Height of the end face above the table during a push, m, where the object is not too low for it."""
+        return self.parameters.tip_height
+
+    @property
+    def lowest_tip_height(self) -> float:
+        """The end face never goes below this height, m."""
+        return self.parameters.lowest_tip_height
+
+    @property
+    def height_share(self) -> float:
+        """The end face is at most at this share of the object's height where it is touched."""
+        return self.parameters.height_share

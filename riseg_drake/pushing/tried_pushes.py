@@ -41,7 +41,7 @@ class KnownScene:
 def times_pushed(thing: NDArray[np.bool_], table: TableMap, tried: Sequence[TriedPush], d_push: float) -> int:
     """How many of the pushes made so far ended at a thing, as cells [rows, columns].
 
-    What was pushed by `d_push`, m, lies where the bar's face stopped.
+    What was pushed by `d_push`, m, lies where the tip's face stopped.
     """
     P = table.points(thing)
     ends = [push.p_WB[:2] + d_push * push.direction_W for push in tried]

@@ -78,12 +78,12 @@ def accessible(
 ) -> NDArray[np.bool_]:
     """Second criterion: objMask = 0 in all of the area the end effector needs, a short distance from b.
 
-    The area is the bar's cross section with its margin all around, the bar's face being `clearance`, m,
+    The area is the tip's cross section with its margin all around, the tip's face being `clearance`, m,
     behind b along cb; b [N, 2], m, directions bc [N, 2].
     """
     margin = pusher.margin
-    along = _steps(-clearance - pusher.thickness - margin, -clearance + min(margin, clearance / 2), table)
-    across = _steps(-pusher.width / 2 - margin, pusher.width / 2 + margin, table)
+    along = steps(-clearance - pusher.thickness - margin, -clearance + min(margin, clearance / 2), table)
+    across = steps(-pusher.width / 2 - margin, pusher.width / 2 + margin, table)
     area = rectangle(b_W, direction_W, along, across)
     occupied: NDArray[np.bool_] = np.any(table.lookup(table.objects, area), axis=(1, 2))
     return ~occupied
@@ -127,6 +127,6 @@ def rectangle(p_W: NDArray, direction_W: NDArray, along: NDArray, across: NDArra
     )
 
 
-def _steps(start: float, stop: float, table: TableMap) -> NDArray[np.float64]:
-    """Values from start to stop, both included, no further apart than the map's cells."""
+def steps(start: float, stop: float, table: TableMap) -> NDArray[np.float64]:
+    """Values [N] from start to stop, m, both included, no further apart than the map's cells."""
     return np.linspace(start, stop, int(np.ceil((stop - start) / table.cell)) + 1)

@@ -201,7 +201,7 @@ class CommandLimiter:
         A joint that was put beyond its margin by hand may come back from there.
         """
         lower, upper = np.minimum(self._lower, self.position), np.maximum(self._upper, self.position)
-        position = np.clip(target.position, lower, upper)
+        position = np.minimum(np.maximum(target.position, lower), upper)
         inside = position == target.position
         leads_out = bool(np.abs(position - target.position).max() > _TINY)
         return Target(position, target.velocity * inside, target.acceleration * inside), leads_out
@@ -237,13 +237,13 @@ class CommandLimiter:
         # Between here and there a joint may be at least as fast as at the slower of both ends.
         lowest, highest = self._velocity_range(np.stack([self.position, target.position]))
         lowest, highest = np.minimum(lowest.max(axis=0), -_CREEP), np.maximum(highest.min(axis=0), _CREEP)
-        self._way.min_velocity, self._way.max_velocity = list(lowest), list(highest)
-        self._way.current_position = list(self.position)
-        self._way.current_velocity = list(self.velocity)
-        self._way.current_acceleration = list(self.acceleration)
-        self._way.target_position = list(target.position)
+        self._way.min_velocity, self._way.max_velocity = lowest.tolist(), highest.tolist()
+        self._way.current_position = self.position.tolist()
+        self._way.current_velocity = self.velocity.tolist()
+        self._way.current_acceleration = self.acceleration.tolist()
+        self._way.target_position = target.position.tolist()
         # A little less, since Ruckig wants a target that could be left again.
-        self._way.target_velocity = list(np.clip(target.velocity, 0.999 * lowest, 0.999 * highest))
+        self._way.target_velocity = np.clip(target.velocity, 0.999 * lowest, 0.999 * highest).tolist()
         self._way.target_acceleration = [0.0] * 7
         way = Trajectory(7)
         # Not `update`, which takes an input that did not change for one that it has answered already.
@@ -258,9 +258,9 @@ class CommandLimiter:
     def _stop_from(
         self, position: NDArray, velocity: NDArray, acceleration: NDArray, braking: InputParameter
     ) -> Trajectory:
-        braking.current_position = list(position)
-        braking.current_velocity = list(velocity)
-        braking.current_acceleration = list(acceleration)
+        braking.current_position = position.tolist()
+        braking.current_velocity = velocity.tolist()
+        braking.current_acceleration = acceleration.tolist()
         stop = Trajectory(7)
         result = self._otg.calculate(braking, stop)
         if result not in (Result.Working, Result.Finished):

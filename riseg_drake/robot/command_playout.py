@@ -33,6 +33,7 @@ class CommandPlayout:
         self._stamps: deque[float] = deque()
         self._values: deque[NDArray[np.float64]] = deque()
         self._positions: deque[NDArray[np.float64]] = deque()  # what velocities sum up to
+        self._velocities: deque[NDArray[np.float64]] = deque()
 
     @property
     def newest(self) -> float:
@@ -44,6 +45,7 @@ class CommandPlayout:
         self._stamps.clear()
         self._values.clear()
         self._positions.clear()
+        self._velocities.clear()
 
     def add(self, stamp: float, values: NDArray, here: NDArray) -> None:
         """Take in a command, rad or rad/s [7], with its stamp, s; one that is not newer than all is left out.
@@ -62,10 +64,14 @@ class CommandPlayout:
         self._stamps.append(stamp)
         self._values.append(values)
         self._positions.append(position)
+        self._velocities.append(values)
+        if not self._is_velocity:  # once a command, and not in each of the robot's cycles
+            for k in range(max(len(self._stamps) - 2, 0), len(self._stamps)):
+                self._velocities[k] = self._slope(k)
 
     def moves(self, least: float = 1e-4) -> bool:
         """Whether the newest commands are of a motion, of more than `least` rad/s in any joint."""
-        return bool(self._stamps) and bool(np.abs(self._velocity(len(self._stamps) - 1)).max() > least)
+        return bool(self._stamps) and bool(np.abs(self._velocities[-1]).max() > least)
 
     def at(self, time: float) -> Target | None:
         """What to be at, at a time by the clock of the stamps, s; None where no command says that."""
@@ -75,11 +81,12 @@ class CommandPlayout:
             self._stamps.popleft()
             self._values.popleft()
             self._positions.popleft()
+            self._velocities.popleft()
         if time <= self._stamps[0]:
             return Target(self._positions[0], np.zeros(7), np.zeros(7))
         last = len(self._stamps) - 1
         if time >= self._stamps[last]:
-            velocity = self._velocity(last)
+            velocity = self._velocities[last]
             ahead = time - self._stamps[last]
             return Target(self._positions[last] + ahead * velocity, velocity, np.zeros(7))
         k = last - 1
@@ -96,17 +103,15 @@ class CommandPlayout:
     def _cubic(self, k: int, time: float) -> Target:
         T = float(self._stamps[k + 1] - self._stamps[k])
         s = (time - self._stamps[k]) / T
-        q_0, v_0, v_1 = self._values[k], T * self._velocity(k), T * self._velocity(k + 1)
+        q_0, v_0, v_1 = self._values[k], T * self._velocities[k], T * self._velocities[k + 1]
         chord = self._values[k + 1] - q_0
         c_2, c_3 = 3 * chord - 2 * v_0 - v_1, v_0 + v_1 - 2 * chord
         position = q_0 + s * (v_0 + s * (c_2 + s * c_3))
         velocity = (v_0 + s * (2 * c_2 + 3 * s * c_3)) / T
         return Target(position, velocity, (2 * c_2 + 6 * s * c_3) / T**2)
 
-    def _velocity(self, k: int) -> NDArray[np.float64]:
-        """rad/s [7] at a command; of joint angles the parabola's through its neighbours."""
-        if self._is_velocity:
-            return self._values[k]
+    def _slope(self, k: int) -> NDArray[np.float64]:
+        """rad/s [7] at a command of joint angles: the parabola's through its neighbours."""
         last = len(self._stamps) - 1
         if last == 0:
             return np.zeros(7)

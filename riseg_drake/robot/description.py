@@ -8,13 +8,15 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import Box
+from pydrake.geometry import Box, SceneGraph
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, Frame, ModelInstanceIndex
 
 from riseg_drake.robot.limits import ROBOTS, RobotLimits
+from riseg_drake.robot.tool import NO_CAMERA, ToolError, add_tool, tool_file
+from riseg_drake.robot.tool_shape import tool_shape
 
 MODELS_PACKAGE = "riseg_drake_models"
 _PACKAGE_NAMED = re.compile(r"(?:package|model)://([^/\s\"'<>]+)/")
@@ -25,22 +27,25 @@ JOINT_NAMES = tuple(f"panda_joint{i}" for i in range(1, 8))
 
 @dataclass
 class PandaDescription:
-    """The arm, and the pusher with its camera. URLs are `package://` or `file://`."""
+    """The arm, and the tool on its flange. URLs are `package://` or `file://`."""
 
     robot: str = field(default="panda", metadata={"choices": tuple(ROBOTS)})
     """Whose limits hold, whatever the model says: the Panda's (Franka Emika Robot) or the Franka Research 3's.
     Their links are of the same lengths, so that one model draws both."""
     arm_url: str = f"package://{MODELS_PACKAGE}/panda/panda.urdf"
     """Or the official description: package://drake_models/franka_description/urdf/panda_arm.urdf."""
-    pusher_url: str = f"package://{MODELS_PACKAGE}/pusher/pusher.sdf"
-    """A model with a link `pusher`, to be bolted to the flange, and the frames `tip` and `camera`."""
+    tool: str = "bar"
+    """`bar`, the paper's of 30 cm; `hand`, the Franka hand with closed fingers; or an SDF or URDF file, its
+    path relative to the scenario's file, with the frames `tip` and, for a camera on the wrist, `camera`. Where
+    the camera is fixed to the world, bar and hand carry none."""
     drake_models: str = ""
     """Folder of an offline copy of the package drake_models; empty: Drake's own, which it downloads."""
     tool_yaw: float = field(default=0.0, metadata={"least": -6.2832, "most": 6.2832})
-    """Angle about the flange's z axis from the flange (panda_link8) to the tip frame E, rad."""
+    """By how much the tool is turned on the flange (panda_link8) about its z axis, beyond what its model says
+    itself (the hand: by -45 degrees, as it is bolted), rad."""
     X_EC: list[float] = field(default_factory=list, metadata={"sizes": (0, 6)})
-    """The camera on the tool as calibrated: x, y, z in m, roll, pitch, yaw in rad; empty: as the pusher's
-    model has it."""
+    """The camera on the tool as calibrated, in the frame of its tip: x, y, z in m, roll, pitch, yaw in rad;
+    empty: as the tool's model has it."""
 
     def check(self) -> None:
         """Raise ValueError for a camera that is nowhere on the tool."""
@@ -60,11 +65,11 @@ class PandaParts:
     """Where to find the arm's pieces in a plant."""
 
     arm: ModelInstanceIndex
-    pusher: ModelInstanceIndex
+    tool: ModelInstanceIndex
     tip_frame: Frame
     """E."""
-    camera_frame: Frame
-    """C, colour optical frame."""
+    camera_frame: Frame | None
+    """C, colour optical frame; None where the camera should be on the tool, and the tool has none."""
 
 
 def models_folder() -> Path:
@@ -102,11 +107,11 @@ def find_packages(parser: Parser, file: Path) -> None:
 def add_panda(
     plant: MultibodyPlant, description: PandaDescription, X_WC: NDArray[np.float64] | None = None
 ) -> PandaParts:
-    """Add the arm, standing on the table's level at the origin of W, with pusher and camera.
+    """Add the arm, standing on the table's level at the origin of W, with tool and camera.
 
     With `X_WC` [4, 4] the camera is fixed to the world there, and the arm must not touch it.
 
-    Raises ValueError where an option names something that is not there.
+    Raises ValueError where an option names something that is not there, ToolError for a tool that is none.
     """
     parser = Parser(plant)
     register_models(parser)
@@ -120,27 +125,39 @@ def add_panda(
         parser.package_map().Remove("drake_models")
         parser.package_map().AddPackageXml(str(package_xml))
     (arm,) = parser.AddModels(url=description.arm_url)
-    (pusher,) = parser.AddModels(url=description.pusher_url)
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("panda_link0", arm))
-    plant.WeldFrames(
-        plant.GetFrameByName("panda_link8", arm),
-        plant.GetFrameByName("pusher", pusher),
-        RigidTransform(RollPitchYaw(0, 0, description.tool_yaw), np.zeros(3)),
-    )
+    file = tool_file(description.tool, models_folder(), bare=X_WC is not None)
+    flange = plant.GetFrameByName("panda_link8", arm)
+    tool = add_tool(plant, parser, file, flange, description.tool_yaw, find_packages)
     _set_limits(plant, arm, description.limits)
-    tip_frame = plant.GetFrameByName("tip", pusher)
+    camera_frame = tool.camera_frame
     if X_WC is not None:
         camera_frame = _add_fixed_camera(plant, RigidTransform(X_WC))
-        return PandaParts(arm=arm, pusher=pusher, tip_frame=tip_frame, camera_frame=camera_frame)
-    camera_frame = plant.GetFrameByName("camera", pusher)
-    if description.X_EC:
+    elif description.X_EC:
         if len(description.X_EC) != 6:
             raise ValueError(
                 f"X_EC: {len(description.X_EC)} numbers; expected 6: x, y, z in m and roll, pitch, yaw in rad"
             )
         X_EC = RigidTransform(RollPitchYaw(description.X_EC[3:]), description.X_EC[:3])
-        camera_frame = plant.AddFrame(FixedOffsetFrame("calibrated_camera", tip_frame, X_EC, pusher))
-    return PandaParts(arm=arm, pusher=pusher, tip_frame=tip_frame, camera_frame=camera_frame)
+        camera_frame = plant.AddFrame(
+            FixedOffsetFrame("calibrated_camera", tool.tip_frame, X_EC, tool.instance)
+        )
+    return PandaParts(arm=arm, tool=tool.instance, tip_frame=tool.tip_frame, camera_frame=camera_frame)
+
+
+def check_tool(description: PandaDescription, X_WC: NDArray[np.float64] | None = None) -> None:
+    """Raise ToolError for a tool that is none, or that lacks the camera which is on it without X_WC [4, 4]."""
+    plant, scene_graph = MultibodyPlant(0.0), SceneGraph()
+    plant.RegisterAsSourceForSceneGraph(scene_graph)
+    parser = Parser(plant)
+    register_models(parser)
+    file = tool_file(description.tool, models_folder(), bare=X_WC is not None)
+    tool = add_tool(plant, parser, file, plant.world_frame(), description.tool_yaw, find_packages)
+    plant.Finalize()
+    inspector = scene_graph.model_inspector()
+    tool_shape(plant, inspector, tool.instance, tool.tip_frame, plant.world_frame(), str(file))
+    if X_WC is None and tool.camera_frame is None and not description.X_EC:
+        raise ToolError(f"{file}: {NO_CAMERA}")
 
 
 def _add_fixed_camera(plant: MultibodyPlant, X_WC: RigidTransform) -> Frame:

@@ -13,6 +13,8 @@ from pydrake.planning import RobotDiagramBuilder
 from riseg_drake.robot.description import PandaDescription, add_panda
 from riseg_drake.robot.inverse import panda_postures
 from riseg_drake.robot.out_of_view import posture_out_of_view
+from riseg_drake.robot.tool import NO_CAMERA, ToolError
+from riseg_drake.robot.tool_shape import ToolShape, tool_shape
 
 LIMIT_MARGIN = 0.05
 """Room that solutions keep to the ends of the joints' ranges, rad."""
@@ -22,7 +24,7 @@ OBSERVING_CLEARANCE = 0.02
 """The same where the arm looks at the scene from an angle, m."""
 
 READY = np.array([0.0, -0.1, 0.0, -2.4, 0.0, 2.3, 0.0])
-"""An elbow-up posture amid the joints' ranges, tool pointing down, rad; where a search starts."""
+"""An elbow-up posture amid the joints' ranges, the flange pointing down and ahead, rad."""
 
 _FREE_ANGLES = 181  # of joint 7 are tried for a pose
 _TABLE_SIZE = (4.0, 4.0, 1.0)
@@ -68,20 +70,43 @@ class PandaKinematics:
         self._flange = self.plant.GetFrameByName("panda_link8", self.parts.arm)
         self.fixed_camera = X_WC
         """X_WC [4, 4] of a camera fixed to the world; None: it moves with the tool."""
-        self.X_EC = self.camera_frame.CalcPose(self._context, self.tip_frame).GetAsMatrix4()
-        """Pose of the camera on the tool, [4, 4]; of no meaning where it is fixed to the world."""
         self.X_EF = self._flange.CalcPose(self._context, self.tip_frame).GetAsMatrix4()
         """Pose of the flange (panda_link8) seen from the tip, [4, 4]."""
+        self.ready = READY - np.arctan2(self.X_EF[0, 1], self.X_EF[0, 0]) * (np.arange(7) == 6)
+        """READY [7], rad, with the tool's x axis ahead instead of the flange's: where a search starts."""
+        parts = self.parts
+        self._X_EC = (
+            parts.camera_frame.CalcPose(self._context, parts.tip_frame).GetAsMatrix4()
+            if parts.camera_frame is not None
+            else None
+        )
+        self._tool_name = description.tool
+        self.tool: ToolShape = tool_shape(
+            self.plant, self.inspector, parts.tool, parts.tip_frame, self._flange, description.tool
+        )
+        """The tool as its collision geometry has it."""
 
     @property
     def tip_frame(self) -> Frame:
-        """E, the tip of the pusher."""
+        """E, the tool's tip."""
         return self.parts.tip_frame
 
     @property
     def camera_frame(self) -> Frame:
-        """C, the camera's optical frame."""
+        """C, the camera's optical frame. Raises ToolError where it should be on the tool and is not."""
+        if self.parts.camera_frame is None:
+            raise ToolError(f"{self._tool_name}: {NO_CAMERA}")
         return self.parts.camera_frame
+
+    @property
+    def X_EC(self) -> NDArray[np.float64]:
+        """Pose of the camera on the tool, [4, 4]; of no meaning where it is fixed to the world.
+
+        Raises ToolError where it should be on the tool and is not.
+        """
+        if self._X_EC is None:
+            raise ToolError(f"{self._tool_name}: {NO_CAMERA}")
+        return self._X_EC
 
     @property
     def inspector(self) -> SceneGraphInspector:
@@ -91,7 +116,7 @@ class PandaKinematics:
     @property
     def models(self) -> tuple[ModelInstanceIndex, ...]:
         """The arm, and its tool."""
-        return self.parts.arm, self.parts.pusher
+        return self.parts.arm, self.parts.tool
 
     def X_WA(self, q: NDArray, frame: Frame) -> NDArray[np.float64]:
         """Pose [4, 4] of any frame of `plant` at joint angles q [7], rad."""
@@ -103,7 +128,7 @@ class PandaKinematics:
         return self.X_WA(q, self.camera_frame)
 
     def X_WE(self, q: NDArray) -> NDArray[np.float64]:
-        """Pose of the pusher's tip at q [7], [4, 4]."""
+        """Pose of the tool's tip at q [7], [4, 4]."""
         return self.X_WA(q, self.tip_frame)
 
     def tip_jacobian(self, q: NDArray) -> NDArray[np.float64]:
@@ -115,7 +140,7 @@ class PandaKinematics:
         )
 
     def clearance(self, q: NDArray, reach: float = 0.1) -> float:
-        """Smallest signed distance of arm, pusher and camera to the table and among each other, m.
+        """Smallest signed distance of arm, tool and camera to the table and among each other, m.
 
         At joint angles q [7], rad. Negative where they penetrate; `reach`, m, where nothing is nearer.
         """
@@ -133,15 +158,16 @@ class PandaKinematics:
     def solve_ik(
         self,
         X_WE: NDArray,
-        q_near: NDArray = READY,
+        q_near: NDArray | None = None,
         margin: float = LIMIT_MARGIN,
         min_clearance: float = MIN_CLEARANCE,
     ) -> NDArray[np.float64] | None:
         """Joint angles [7], rad, with the tip exactly at X_WE [4, 4], free of collision, or None.
 
-        Of all such postures the one nearest to q_near [7] is taken (largest joint difference), with some
-        liking for room to the joints' limits.
+        Of all such postures the one nearest to q_near [7] (`ready` if None) is taken (largest joint
+        difference), with some liking for room to the joints' limits.
         """
+        q_near = self.ready if q_near is None else q_near
         q = self.postures(X_WE, margin)
         order = np.argsort(np.abs(q - q_near).max(axis=1) - 0.2 * self.limits.room(q).min(axis=1))
         for candidate in q[order]:
@@ -204,7 +230,7 @@ def observe_pose(
     """X_WE [4, 4] with the camera looking at p_WT [3] from `distance` m, straight down with pitch 0.
 
     `yaw` is the direction of the image's upper edge about W's z axis; 0 is away from the robot, so that
-    the pusher stands on the robot's side of what is looked at. `pitch`, rad, turns the camera about the
+    the tool stands on the robot's side of what is looked at. `pitch`, rad, turns the camera about the
     image's horizontal axis, so that it looks more towards where the upper edge was.
     """
     X_WE = tip_pointing_down(np.zeros(3), yaw)
@@ -265,7 +291,7 @@ def _roomiest(
     """The posture [7] with the view leaning by `pitch` that is furthest from the joints' limits; None: none.
 
     Looked for all around the point, in steps of 15 degrees from where the image's upper edge is away from
-    the robot, with the camera on either side of the pusher.
+    the robot, with the camera on either side of the tool.
     """
     best, best_room = None, 0.0
     for turn in sorted(np.arange(-11, 13) * np.pi / 12, key=abs):

@@ -70,9 +70,9 @@ class RobotLimits:
         if self.slowing_down is None:
             fastest = np.full(np.shape(q), self.velocity)
             return -fastest, fastest
-        downwards = self.slowing_down.speed(q - self.position_lower)
-        upwards = self.slowing_down.speed(self.position_upper - q)
-        return -np.minimum(downwards, self.velocity), np.minimum(upwards, self.velocity)
+        room = np.array([q - self.position_lower, self.position_upper - q])
+        downwards, upwards = np.minimum(self.slowing_down.speed(room), self.velocity)
+        return -downwards, upwards
 
 
 def check_start_position(start_position: Sequence[float], limits: RobotLimits, margin: float = 0.0) -> None:

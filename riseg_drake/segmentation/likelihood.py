@@ -132,6 +132,17 @@ def motion_costs(
     return Costs(misfit, keyframe.point_count.astype(float), lost, compared.leaves)
 
 
+def unexplained_parts(nats: NDArray[np.float64], part: NDArray[np.intp]) -> NDArray[np.float64]:
+    """[P], nats by which the one motion that explains a part best falls short of the best of each superpixel.
+
+    Args:
+        nats: [G, N], how much worse than the best each motion explains each superpixel.
+        part: [N], 0.., of each superpixel.
+    """
+    count = int(part.max(initial=-1)) + 1
+    return np.min([np.bincount(part, n, count) for n in nats], axis=0)
+
+
 def _misfit(
     compared: Comparison,
     motion_K: NDArray[np.float64],

@@ -8,7 +8,6 @@ with all of what may be one body, whose outline and height tell.
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import product
 
 import cv2
 import numpy as np
@@ -19,7 +18,12 @@ from riseg_drake.geometry.camera import rays
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.alignment import AlignmentParameters, rigid_fit
 from riseg_drake.segmentation.comparison import Comparison
-from riseg_drake.segmentation.likelihood import Costs, LikelihoodParameters, motion_costs
+from riseg_drake.segmentation.likelihood import (
+    Costs,
+    LikelihoodParameters,
+    motion_costs,
+    unexplained_parts,
+)
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.slides import SlideCosts, slides
 
@@ -170,17 +174,6 @@ def _missed(bodies: NDArray[np.bool_], costs: Costs, parameters: LikelihoodParam
     return missed
 
 
-def unexplained_parts(nats: NDArray[np.float64], part: NDArray[np.intp]) -> NDArray[np.float64]:
-    """[P], nats by which the one motion that explains a part best falls short of the best of each superpixel.
-
-    Args:
-        nats: [G, N], how much worse than the best each motion explains each superpixel.
-        part: [N], 0.., of each superpixel.
-    """
-    count = int(part.max(initial=-1)) + 1
-    return np.min([np.bincount(part, n, count) for n in nats], axis=0)
-
-
 class _Search:
     """A keyframe and a frame, prepared for many motions, and those that were found."""
 
@@ -240,26 +233,44 @@ class _Search:
         self, patch: NDArray[np.bool_], distance: NDArray[np.float64]
     ) -> tuple[float, NDArray, Costs] | None:
         """What a patch [N] did: the gain, nats, the motion [4, 4], and its costs."""
-        best_known = self.costs.misfit.min(0)
         blank = not np.isfinite(distance).all()
         samples = self._parameters.samples * (3 if blank else 1)
         results = []
-        for start, better_by in product(self._valleys(patch, samples), (_BETTER, -np.inf)):
+        for start in self._valleys(patch, samples):
+            ends = [self._fitted_to(patch, start)] if blank else self._grown(patch, distance, start)
+            for motion in ends:
+                own = self._costs(motion)
+                results.append((self._gain(own), motion, own))
+        # Gains end where noise begins; among those that are alike the patch itself tells.
+        weight = self.costs.point_count * patch / (2 * self._likelihood.correlated_gray)
+        return max(results, key=lambda r: r[0] - float(weight @ r[2].misfit[0]), default=None)
+
+    def _fitted_to(self, patch: NDArray[np.bool_], motion: NDArray) -> NDArray:
+        """A motion [4, 4] sharpened on all of a patch [N], which is one body whatever explains its parts."""
+        for _ in _GROWTH:
+            fitted = self._fitted(motion, patch)
+            if fitted is None:
+                break
+            motion = fitted
+        return motion
+
+    def _grown(self, patch: NDArray[np.bool_], distance: NDArray[np.float64], start: NDArray) -> list[NDArray]:
+        """A motion [4, 4] sharpened on a patch [N] and then on ever more of what it explains around, within a
+        distance [N], m; or explains better than what is known does, so that there are two answers."""
+        best_known, ends = self.costs.misfit.min(0), []
+        for better_by in (_BETTER, -np.inf):
             motion = start
             for radius in _GROWTH:
                 mine = self._costs(motion).misfit[0]
                 explained = (mine < self._parameters.unexplained + 1) & (mine < best_known - better_by)
-                if radius == _GROWTH[0] or blank:
+                if radius == _GROWTH[0]:
                     explained |= patch
                 fitted = self._fitted(motion, explained & (distance < radius * self._parameters.patch))
                 if fitted is None:
                     break
                 motion = fitted
-            own = self._costs(motion)
-            results.append((self._gain(own), motion, own))
-        # Gains end where noise begins; among those that are alike the patch itself tells.
-        weight = self.costs.point_count * patch / (2 * self._likelihood.correlated_gray)
-        return max(results, key=lambda r: r[0] - float(weight @ r[2].misfit[0]), default=None)
+            ends.append(motion)
+        return ends
 
     def _differs(self, motion: NDArray, patch: NDArray[np.bool_]) -> bool:
         """Whether a motion takes a patch elsewhere than standing still and what was found [4, 4] do."""

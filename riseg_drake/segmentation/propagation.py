@@ -37,6 +37,9 @@ _CLOSE = 5
 _BEHIND = 0.03
 """Share of its depth by which what shows through such a gap lies behind."""
 
+_STEPS = 65535
+"""Of nearness, 1 / depth, that are told apart: 16 bits."""
+
 
 def carry_labels(
     pair: FramePair,
@@ -63,13 +66,7 @@ def carry_labels(
     surface = surface_pixels(above_1.mask, current.depth, current.intrinsics)
     label = np.zeros(len(surface), np.uint16)
     gap = np.full(len(surface), _DEPTH_AGREES, np.float32)
-    still = np.ones(65536, bool)
-    still[[0, *motion_of]] = False
-    for ids, motion in _by_motion(motion_of):
-        moves = still
-        if ids:
-            moves = np.zeros(65536, bool)
-            moves[ids] = True
+    for moves, motion in _by_motion(motion_of):
         found, apart = _look_up(surface, inverse(pair.X_C1C0 @ motion), label_0, pair.reference)
         better = (apart < gap) & moves.take(found)
         np.copyto(label, found, where=better)
@@ -97,21 +94,22 @@ def draw_labels(
     X_C1C0 = inverse(current.X_WC) @ reference.X_WC
     surface = surface_pixels(label_0 > 0, reference.depth, reference.intrinsics)
     owner = label_0.ravel().take(surface.index)
-    still = np.ones(65536, bool)
-    still[list(motion_of)] = False
     places, per_depths, labels = [], [], []
-    for ids, motion in _by_motion(motion_of):
-        own = np.flatnonzero(np.isin(owner, ids) if ids else still.take(owner))
+    for moves, motion in _by_motion(motion_of):
+        own = np.flatnonzero(moves.take(owner))
         sought = seek(surface.subset(own), X_C1C0 @ motion)
         inside = np.flatnonzero(sought.inside(current.intrinsics.shape))
-        v, u = (np.rint(x.ravel()[inside]).astype(np.intp) for x in (sought.v, sought.u))
+        v, u = (np.rint(x.ravel().take(inside)).astype(np.intp) for x in (sought.v, sought.u))
         places.append(v * current.intrinsics.width + u)
-        per_depths.append(1 / sought.depth[inside])
-        labels.append(owner[own[inside]])
+        per_depths.append(1 / sought.depth.take(inside))
+        labels.append(owner.take(own.take(inside)))
     place, per_depth, label = (np.concatenate(each) for each in (places, per_depths, labels))
-    order = np.argsort(per_depth, kind="stable")  # what is nearest is drawn last
+    # What is nearest is drawn last; in steps of nearness, as few as are sorted quickly.
+    steps = (per_depth * (_STEPS / max(float(per_depth.max(initial=0)), 1e-9))).astype(np.uint16)
+    order = np.argsort(steps, kind="stable")
+    place, per_depth, label = place.take(order), per_depth.take(order), label.take(order)
     spots, drawn = np.zeros(current.intrinsics.shape, np.float32), np.zeros(current.intrinsics.shape, np.uint16)
-    spots.ravel()[place[order]], drawn.ravel()[place[order]] = per_depth[order], label[order]
+    spots.ravel()[place], drawn.ravel()[place] = per_depth, label
     # Nearer than it was, a thing is larger: its points leave gaps, through which others show.
     closed = cv2.morphologyEx(spots, cv2.MORPH_CLOSE, np.ones((_CLOSE, _CLOSE), np.uint8))
     drawn[closed > (1 + _BEHIND) * spots] = 0
@@ -160,16 +158,20 @@ def pixels_of(p_CQ: NDArray, intrinsics: Intrinsics) -> tuple[NDArray[np.intp], 
     return vu, inside
 
 
-def _by_motion(motion_of: Mapping[int, NDArray]) -> list[tuple[list[int], NDArray]]:
-    """Ids that share a motion, together; standing still (no ids) first."""
-    groups: list[tuple[list[int], NDArray]] = [([], np.eye(4))]
+def _by_motion(motion_of: Mapping[int, NDArray]) -> list[tuple[NDArray[np.bool_], NDArray]]:
+    """For each motion that ids > 0 have, which of all labels [65536] have it; standing still first."""
+    still = np.ones(65536, bool)
+    still[[0, *motion_of]] = False
+    groups: list[tuple[NDArray[np.bool_], NDArray]] = [(still, np.eye(4))]
     for a, motion in motion_of.items():
-        for ids, shared in groups[1:]:
+        for moves, shared in groups[1:]:
             if shared is motion or np.array_equal(shared, motion):
-                ids.append(a)
+                moves[a] = True
                 break
         else:
-            groups.append(([a], motion))
+            moves = np.zeros(65536, bool)
+            moves[a] = True
+            groups.append((moves, motion))
     return groups
 
 

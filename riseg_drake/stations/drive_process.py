@@ -9,14 +9,19 @@ from collections.abc import Callable
 from contextlib import suppress
 
 import numpy as np
-from drake import lcmt_drake_signal, lcmt_panda_command
+from drake import lcmt_panda_command
 from numpy.typing import NDArray
 from pydrake.lcm import DrakeLcmInterface
 
 from riseg_drake.robot.supervisor import REFLEX
 from riseg_drake.stations.arm_drive import ArmDrive, Drive, DriveOutput, RobotReading
+from riseg_drake.stations.cycle_times import CycleTimes
+from riseg_drake.stations.driver_reasons import reasons_message
 from riseg_drake.stations.franka_link import Link, RobotStopped
 from riseg_drake.stations.lcm_channels import LcmConfig
+
+PRIORITY = 80
+"""Among real-time processes, where the system allows that: before the one that sends commands."""
 
 _STOPPED_BY = {3: "somebody guides the arm by hand", 5: "the stop button is pressed"}
 _IDLE = 1
@@ -26,7 +31,7 @@ _TELL_ERRORS = 0.1  # s; between two messages with the names of errors, while th
 class DriveProcess:
     """An arm's driver between a network and a robot; `run` returns when it was told to `end`.
 
-    `cycles` holds how long the work of each controlled cycle took, s of this thread's processor time.
+    `cycles` tells how long the work of a controlled cycle took, s of this thread's processor time.
     """
 
     def __init__(
@@ -45,7 +50,7 @@ class DriveProcess:
         self._is_ending = False
         self._recovers = False
         self._told_errors = -np.inf
-        self.cycles: list[float] = []
+        self.cycles = CycleTimes()
         network.Subscribe(config.command_channel, lambda data: _decode(data, self._commands))
         network.Subscribe(config.recovery_channel, lambda data: _decode(data, self._words))
 
@@ -88,7 +93,7 @@ class DriveProcess:
                 self._drive.begin(reading)
                 begun = True
             output = self._step(reading)
-            self.cycles.append(time.thread_time() - started)
+            self.cycles.add(time.thread_time() - started)
             assert output.command is not None
             return output.command, output.finished
 
@@ -126,11 +131,7 @@ class DriveProcess:
         if abs(now - self._told_errors) < _TELL_ERRORS:
             return
         self._told_errors = now
-        message = lcmt_drake_signal()
-        message.timestamp = int(1e3 * now)
-        message.coord = [self._drive.state.value, *self._drive.reason.split(", ")]
-        message.val = [1.0] * len(message.coord)
-        message.dim = len(message.coord)
+        message = reasons_message(self._drive.state.value, self._drive.reason.split(", "), now)
         self._network.Publish(self._config.errors_channel, message.encode())
 
     def _reason(self, mode: int, errors: str) -> str:

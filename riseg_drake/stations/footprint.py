@@ -5,27 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import (
-    Box,
-    Capsule,
-    Convex,
-    Cylinder,
-    Ellipsoid,
-    GeometryId,
-    HalfSpace,
-    Mesh,
-    SceneGraphInspector,
-    Shape,
-    Sphere,
-)
+from pydrake.geometry import GeometryId, SceneGraphInspector
 from pydrake.math import RigidTransform
 from scipy.spatial import ConvexHull, QhullError
 
-_CIRCLE = np.stack([np.cos(t := np.linspace(0, 2 * np.pi, 32, endpoint=False)), np.sin(t)], axis=-1)
-_POLAR = np.linspace(0, np.pi, 17)
-_SPHERE = np.concatenate(
-    [np.column_stack([np.sin(p) * _CIRCLE, np.full(len(_CIRCLE), np.cos(p))]) for p in _POLAR]
-)
+from riseg_drake.robot.shape_corners import shape_corners
 
 
 @dataclass(frozen=True)
@@ -84,33 +68,6 @@ def _inside(points: NDArray, convex: NDArray) -> NDArray:
     edge = np.roll(convex, -1, axis=0) - convex
     outward = np.column_stack([edge[:, 1], -edge[:, 0]])
     return np.all(np.einsum("nmk,mk->nm", points[:, None] - convex, outward) <= 1e-9, axis=1)
-
-
-def shape_corners(shape: Shape) -> NDArray:
-    """Points [n, 3] whose convex hull is the shape, or very nearly. Raises ValueError for an unknown shape."""
-    match shape:
-        case Box():
-            half = np.asarray(shape.size()) / 2
-            return np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
-        case Sphere():
-            return _SPHERE * shape.radius()
-        case Ellipsoid():
-            return _SPHERE * (shape.a(), shape.b(), shape.c())
-        case Cylinder():
-            top = 0.5 * shape.length()
-            return np.vstack(
-                [np.column_stack([_CIRCLE * shape.radius(), np.full(len(_CIRCLE), z)]) for z in (-top, top)]
-            )
-        case Capsule():
-            top_xyz = np.array([0.0, 0.0, 0.5 * shape.length()])
-            return np.vstack([_SPHERE * shape.radius() - top_xyz, _SPHERE * shape.radius() + top_xyz])
-        case Convex() | Mesh():
-            hull = shape.GetConvexHull()
-            return np.array([hull.vertex(i) for i in range(hull.num_vertices())])
-        case HalfSpace():
-            raise ValueError("a half space as collision geometry has no extent; a box or a mesh would do")
-        case _:
-            raise ValueError(f"collision geometry of type {type(shape).__name__} is not supported")
 
 
 def travel(moving: Footprint, fixed: Footprint, direction: NDArray) -> float:

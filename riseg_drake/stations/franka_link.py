@@ -31,6 +31,11 @@ _REFLEX_FORCE, _REFLEX_TORQUE = (
     100.0,
     100.0,
 )  # N and N m: the supervisor stops earlier; as drake-franka-driver has it
+_VERSIONS = re.compile(  # as libfranka says it, and as panda-python does
+    r"(?:[Ss]erver version: |robot speaks protocol version )(\d+)"
+    r".*?(?:[Ll]ibrary version: |that speaks version )(\d+)",
+    re.S,
+)
 
 
 class LinkError(RuntimeError):
@@ -180,12 +185,12 @@ def told(error: BaseException | str) -> str:
     """What libfranka says, in one line without its name; of errors of the robot the names alone."""
     text = " ".join(str(error).split()).removeprefix("libfranka: ")
     names = re.findall(r'"([a-z_0-9]+)"', text)
-    return ", ".join(names) or text
+    return ", ".join(names) or text.removesuffix(".")
 
 
 def why_not_connected(robot: str, address: str, text: str) -> str:
     """One line on why there is no connection to `robot` at an address, from what libfranka said."""
-    versions = re.search(r"[Ss]erver version: (\d+).*?[Ll]ibrary version: (\d+)", text, re.S)
+    versions = _VERSIONS.search(text)
     if versions:
         other = {"fr3": "panda", "panda": "fr3"}[robot]
         return (
@@ -209,8 +214,10 @@ def _library(robot: str) -> Any:
     try:
         return import_module(_MODULES[robot])
     except ImportError:
+        python = " with Python 3.11 or 3.12, for which alone there is one" if robot == "fr3" else ""
         raise LinkError(
-            f"station.panda.robot is {robot}, which needs {PACKAGES[robot]}: pip install 'riseg-drake[{robot}]'"
+            f"station.panda.robot is {robot}, which needs {PACKAGES[robot]}: "
+            f"pip install 'riseg-drake[{robot}]'{python}"
         ) from None
 
 

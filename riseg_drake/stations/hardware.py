@@ -152,7 +152,9 @@ class HardwareStation(Diagram):
         for name, port in LcmView.PORTS.items():
             builder.ExportOutput(view.GetOutputPort(port), name)
         if meshcat is not None:
-            angles = add_arm_view(builder, config.panda, meshcat, MeshcatVisualizerParams())
+            angles = add_arm_view(
+                builder, config.panda, config.camera.fixed_pose, meshcat, MeshcatVisualizerParams()
+            )
             builder.Connect(view.GetOutputPort("position"), angles)
         builder.BuildInto(self)
         self.set_name("station")

@@ -11,6 +11,10 @@ RECEIVE_LIMIT = Path("/proc/sys/net/core/rmem_max")
 LONGEST_NAME = 38
 """Of a channel or serial number, letters: LCM takes 63, and an image channel's begins with 25 of its own."""
 
+ARM_DRIVERS = "`riseg drive-arm` or drake-franka-driver"
+CAMERA_DRIVERS = "`riseg drive-camera` or realsense_rgbd_publisher"
+"""The programs that speak as the arm and as the camera, for people; one of each is wanted."""
+
 _KINDS = ("udpm", "tcpq", "file", "memq")
 
 

@@ -9,7 +9,9 @@ from pydrake.lcm import DrakeLcmInterface
 
 from riseg_drake.robot.command_stream import ArmStatus
 from riseg_drake.robot.position_history import PositionHistory
+from riseg_drake.robot.supervisor import MOVE
 from riseg_drake.stations.arm_messages import AHEAD, BEHIND, PictureDoor, StatusDoor
+from riseg_drake.stations.driver_reasons import told_reasons
 from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.lcm_channels import LcmConfig
 from riseg_drake.stations.lcm_images import ImageError, decode_message
@@ -63,7 +65,10 @@ class Reception:
         """How many have been let in."""
         self.pictures = 0
         """How many have been let in."""
+        self.driver_says = ""
+        """Why the arm takes no commands, by its driver; empty while it takes some or nothing is said."""
         lcm.Subscribe(config.status_channel, self._take_status)
+        lcm.Subscribe(config.errors_channel, self._take_reasons)
         lcm.Subscribe(config.image_channel, self._take_picture)
 
     @property
@@ -157,6 +162,11 @@ class Reception:
             self._history.add(status.time, status.position, status.velocity)
         self.status = status
         self.statuses += 1
+        if status.robot_mode == MOVE:
+            self.driver_says = ""
+
+    def _take_reasons(self, data: bytes) -> None:
+        self.driver_says = told_reasons(data)
 
     def _take_picture(self, data: bytes) -> None:
         if self._replayed and self._log_shift is None:

@@ -18,8 +18,9 @@ from pydrake.multibody.tree import RigidBody
 from riseg_drake.host.model_files import ModelFileError, reading_model
 from riseg_drake.host.terminal import one_line
 from riseg_drake.robot.description import find_packages, register_models
+from riseg_drake.robot.shape_corners import shape_corners
 from riseg_drake.stations.contact import touches_over_area
-from riseg_drake.stations.footprint import Footprint, footprint, shape_corners
+from riseg_drake.stations.footprint import Footprint, footprint
 from riseg_drake.stations.roundness import axes_of_revolution
 
 SMALLEST, LARGEST = 0.003, 1.0

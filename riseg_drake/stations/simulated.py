@@ -133,10 +133,10 @@ def add_world(
     """
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, step)
     panda = add_panda(plant, config.panda, config.camera.fixed_pose)
-    for body in plant.GetBodyIndices(panda.pusher):
+    for body in plant.GetBodyIndices(panda.tool):
         pushing = plant.GetCollisionGeometriesForBody(plant.get_body(body))
         let_touch(plant, scene_graph, pushing, rigid=True)
-    for instance in (panda.arm, panda.pusher):
+    for instance in (panda.arm, panda.tool):
         plant.set_gravity_enabled(instance, False)
     _add_table(plant, scene_graph, config.table)
     if objects is None:
@@ -201,7 +201,7 @@ class SimulatedStation(Diagram):
         """Index of the body of each object id."""
         self.plant = plant
         self.scene_graph = scene_graph
-        robot, bodies = (panda.arm, panda.pusher), list(world.object_bodies.values())
+        robot, bodies = (panda.arm, panda.tool), list(world.object_bodies.values())
         self.sleep = Sleep(plant, scene_graph, robot, bodies, 1 / config.camera.rate)
         """Asked once a picture, what lies still costs next to nothing."""
 

@@ -5,7 +5,7 @@ from pydrake.geometry import Meshcat
 from riseg_drake.app import meshcat_push
 from riseg_drake.app.meshcat_push import draw_push
 from riseg_drake.pushing.push import Push
-from riseg_drake.pushing.pusher import Pusher
+from tests.pushing.bar import BAR
 
 
 def push(**others):
@@ -42,22 +42,22 @@ class Paper:
 
 def test_a_push_is_drawn_as_arrow_and_swept_area():
     meshcat = Meshcat()
-    draw_push(meshcat, "/push", push(), Pusher())
+    draw_push(meshcat, "/push", push(), BAR)
     for part in ("arrow/shaft", "arrow/head", "swept"):
         assert meshcat.HasPath(f"/push/{part}")
 
 
 def test_the_arrow_ends_where_the_contact_will_be():
     paper = Paper()
-    draw_push(paper, "/push", push(), Pusher())
+    draw_push(paper, "/push", push(), BAR)
     # The cone's point is its origin.
     expected = [0.518 + 0.03 * 0.6, 0.124 + 0.03 * 0.8, 0.01 + meshcat_push.ARROW_LIFT]
     assert paper.poses["/push/arrow/head"].translation() == pytest.approx(expected)
 
 
 def test_the_swept_area_reaches_from_the_bars_back_at_first_to_its_face_at_last():
-    paper, pusher = Paper(), Pusher(thickness=0.02, width=0.03)
-    draw_push(paper, "/push", push(), pusher)
+    paper = Paper()
+    draw_push(paper, "/push", push(), BAR)
     box, X_WS = paper.shapes["/push/swept"], paper.poses["/push/swept"]
     assert box.size()[:2] == pytest.approx([0.07, 0.03])
     ends = [X_WS.multiply(np.array([sign * 0.035, 0.0, 0.0])) for sign in (-1, 1)]

@@ -19,7 +19,7 @@ from riseg_drake.recording.layout import camera_from_json
 from tests.docs.given import ROBOT_RECORDING, give
 from tests.docs.pages import CHECKOUT, PAGES, all_blocks, blocks, code_spans, commands, name
 
-LANGUAGES = {"bash", "python", "yaml", "json", "text"}
+LANGUAGES = {"bash", "python", "yaml", "json", "xml", "text"}
 """A block of `text` is a drawing, or what a program says; nothing is done with it here."""
 
 SHORT = Path("short")
@@ -232,6 +232,8 @@ def test_a_page_does_what_it_says_from_top_to_bottom(page, tmp_path, monkeypatch
             exec(compile("\n" * (block.line - 1) + block.text, str(page), "exec"), namespace)
         elif block.language == "yaml" and (named := re.match(r"# (\S+\.yaml)\n", block.text)):
             Path(named[1]).write_text(block.text)
+        elif block.language == "xml":
+            Path(re.match(r"<!-- (\w+\.(?:sdf|urdf)):", block.text)[1]).write_text(block.text)
         elif block.language == "bash":
             for words in commands(block):
                 reduced = EXECUTED[words[1]][0](without_rerun(words[1:])) if words[0] == "riseg" else None

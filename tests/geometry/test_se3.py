@@ -46,6 +46,12 @@ def test_log_undoes_exp(angle: float) -> None:
     np.testing.assert_allclose(log_se3(exp_se3(V)), V, atol=1e-9)
 
 
+def test_near_no_rotation_log_has_the_next_term_of_its_series_too() -> None:
+    # Without it, or with another divisor, a rotation of 0.9e-4 is wrong by more than 1e-10 of itself.
+    V = np.array([0.9e-4, 0.0, 0.0, 1.0, 2.0, 3.0])
+    np.testing.assert_allclose(log_se3(exp_se3(V))[0], V[0], rtol=3e-11)
+
+
 def test_inverse_and_moved_points_agree_with_drake() -> None:
     rng = np.random.default_rng(3)
     X_AB = random_pose(rng)

@@ -78,6 +78,33 @@ def test_every_stop_signal_is_heard_as_ctrl_c(monkeypatch, capsys, number, code)
         signal.signal(number, outside)
 
 
+STOPPED_WHILE_A_MISTAKE_IS_TOLD = """
+import os, signal, sys
+from riseg_drake.app import commands
+from riseg_drake.__main__ import program
+
+def mistaken(*_):
+    sys.meta_path.insert(0, Interrupting())
+    raise ValueError("mine")
+
+class Interrupting:
+    def find_spec(self, name, path=None, target=None):
+        if name.startswith("riseg_drake.app.emulate"):
+            os.kill(os.getpid(), signal.SIGINT)
+            for _ in range(1000): pass  # here the signal is heard
+
+commands.diagram = mistaken
+sys.argv = ["riseg", "diagram"]
+raise SystemExit(program())
+"""
+
+
+def test_ctrl_c_while_it_is_found_out_whether_an_error_is_a_mistake_is_one_line_too():
+    words = [sys.executable, "-c", STOPPED_WHILE_A_MISTAKE_IS_TOLD]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "riseg: stopped\n")
+
+
 def test_what_a_library_makes_of_ctrl_c_is_still_ctrl_c(monkeypatch, capsys):
     def translated(*_):
         try:

@@ -1,9 +1,14 @@
+import itertools
+
 import numpy as np
 import pytest
+from scipy.spatial.distance import cdist
 from threadpoolctl import threadpool_limits
 
-from riseg_drake.pushing.clustering import METHODS, ClusteringParameters, clusterings, elbow
+from riseg_drake.pushing.clustering import METHODS, ClusteringParameters, _k_medoids, clusterings, elbow
 
+MEDOIDS = np.array([[5.0, 1], [17, 15], [9, 11], [27, 6], [26, 28], [12, 17], [4, 8], [18, 1], [23, 4]])
+"""Nine points with four pairs of medoids that stay, and of which the best depends on what is summed."""
 PLACES = np.array([[0.4, -0.1], [0.6, -0.1], [0.4, 0.1], [0.6, 0.1], [0.5, 0.0], [0.7, 0.0]])
 
 
@@ -79,3 +84,24 @@ def test_the_clusters_are_the_same_to_the_last_bit_whatever_the_number_of_thread
             answers.append([c.centers for c in clusterings(points, ClusteringParameters(), rng)])
     for one, two in zip(*answers, strict=True):
         np.testing.assert_array_equal(one, two)
+
+
+def test_of_two_medoids_those_with_the_smallest_sum_of_squares_are_taken_and_it_is_told():
+    """Against all pairs of points that are the middles of their own clusters (Park and Jun 2009)."""
+    points = MEDOIDS
+    distance = cdist(points, points)
+    stable = []
+    for pair in itertools.combinations(range(len(points)), 2):
+        nearest = distance[:, pair].argmin(1)
+        middles = [
+            np.flatnonzero(nearest == k)[distance[np.ix_(nearest == k, nearest == k)].sum(1).argmin()]
+            for k in range(2)
+        ]
+        if middles == list(pair):
+            stable.append(pair)
+    best = [min(stable, key=lambda pair: (distance[:, pair].min(1) ** power).sum()) for power in (1, 2, 3, 4)]
+    assert len(set(best)) > 2  # other powers would choose others
+    assert best[1] not in (best[0], best[2], best[3])
+    centers, inertia = _k_medoids(points, 2, 60, np.random.default_rng(0))
+    np.testing.assert_array_equal(np.sort(centers, axis=0), np.sort(points[list(best[1])], axis=0))
+    assert inertia == pytest.approx((distance[:, best[1]].min(1) ** 2).sum())

@@ -4,12 +4,15 @@ import pytest
 from riseg_drake.pushing.contact import find_contacts
 from riseg_drake.pushing.pusher import Pusher
 from riseg_drake.pushing.validity import ValidityParameters
+from tests.pushing.bar import BAR
 
 ALONG_X = np.array([[1.0, 0.0]])
 
 
 def contact_of(drawn, cluster, boundary_W):
-    return find_contacts(np.array([boundary_W]), ALONG_X, cluster, drawn.map(), Pusher(), ValidityParameters())
+    return find_contacts(
+        np.array([boundary_W]), ALONG_X, cluster, drawn.map(), Pusher(BAR), ValidityParameters()
+    )
 
 
 def test_bar_touches_what_protrudes_within_its_width(drawn):
@@ -62,7 +65,7 @@ def pushed_through(drawn, gap, through):
     table = drawn.box(edge - through / 2, 0.0, through, 0.04).map()
     boundary_W = np.array([[edge - through, 0.0]])
     contacts = find_contacts(
-        boundary_W, ALONG_X, table.objects, table, Pusher(), ValidityParameters(), target=target
+        boundary_W, ALONG_X, table.objects, table, Pusher(BAR), ValidityParameters(), target=target
     )
     assert contacts.b_W[0] == pytest.approx(boundary_W[0], abs=0.003)
     return contacts.transmitted[0]

@@ -12,10 +12,11 @@ from riseg_drake.pushing.find_action import (
 )
 from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.pushing.tried_pushes import KnownScene, TriedPush
+from tests.pushing.bar import BAR
 
 
 def decide(table, seed=0, tried=(), heading_W=None, **options):
-    return find_action(KnownScene(table, tried, heading_W), np.random.default_rng(seed), **options)
+    return find_action(KnownScene(table, tried, heading_W), np.random.default_rng(seed), BAR, **options)
 
 
 def act(table, seed=0, **options):

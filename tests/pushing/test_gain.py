@@ -8,6 +8,7 @@ from riseg_drake.pushing.gain import GainParameters, expected_gain, most_to_expe
 from riseg_drake.pushing.pusher import Pusher
 from riseg_drake.pushing.tried_pushes import KnownScene, TriedPush
 from riseg_drake.pushing.validity import ValidityParameters, overlap_after_push
+from tests.pushing.bar import BAR
 
 ALONG_X = np.array([[1.0, 0.0]])
 
@@ -22,7 +23,7 @@ def box(drawn):
 def gain_of(drawn, cluster, tried=(), tries=0, heading_W=None):
     """Of the push from the left."""
     table, validity = drawn.map(), ValidityParameters()
-    contacts = find_contacts(np.array([[0.5, 0.0]]), ALONG_X, cluster, table, Pusher(), validity)
+    contacts = find_contacts(np.array([[0.5, 0.0]]), ALONG_X, cluster, table, Pusher(BAR), validity)
     overlap = overlap_after_push(ALONG_X, cluster, table, validity.d_push)
     (gain,) = expected_gain(
         contacts,

@@ -12,6 +12,7 @@ from riseg_drake.pushing.gain import GainParameters
 from riseg_drake.pushing.levels import LevelsParameters, raised
 from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.pushing.tried_pushes import KnownScene
+from tests.pushing.bar import BAR
 
 
 def stack(drawn, lower=0.04, upper=0.08):
@@ -43,7 +44,7 @@ def test_the_level_follows_a_table_that_is_not_at_zero_height(drawn):
 
 
 def test_the_upper_box_is_pushed_just_above_the_lower_one(drawn):
-    push = find_action(KnownScene(stack(drawn).map()), np.random.default_rng(0)).push
+    push = find_action(KnownScene(stack(drawn).map()), np.random.default_rng(0), BAR).push
     assert push.tip_height == pytest.approx(0.008)
     assert push.p_WE[2] == pytest.approx(0.044 + 0.008, abs=1e-6)
     assert np.abs(push.cluster_W - [0.52, 0.01]).max() <= 0.026
@@ -101,7 +102,7 @@ def test_another_known_thing_at_that_height_is_in_the_way(drawn):
     [(upper, above)] = levels(drawn)
     assert above.segmented.sum() == pytest.approx(15 * 60, abs=80)
     assert not (above.segmented & upper).any()
-    push = find_action(KnownScene(drawn.map()), np.random.default_rng(0)).push
+    push = find_action(KnownScene(drawn.map()), np.random.default_rng(0), BAR).push
     assert push is not NO_PUSH
     assert push.direction_W[0] < 0.9
 
@@ -126,7 +127,7 @@ def test_nothing_is_pushed_off_what_it_lies_on(drawn):
     found = []
     for upper, above in levels(drawn):
         for each in find_clusters(upper, above, ClustersParameters(), np.random.default_rng(0)):
-            pushes, failed = valid_pushes(each, KnownScene(above), FindActionParameters())
+            pushes, failed = valid_pushes(each, KnownScene(above), BAR, FindActionParameters())
             assert failed[Criterion.STAYS_ON_TOP].any()
             found += pushes
     # Of its 5 cm, 30 % may hang over: of a push by 2 cm 1.5 cm to a side, and nothing at the near edge.
@@ -137,9 +138,9 @@ def test_nothing_is_pushed_off_what_it_lies_on(drawn):
 def test_what_lies_on_another_is_left_alone_where_too_little_is_to_be_expected(drawn):
     # With no more to expect above the lower box than `least`, one of its own sides is pushed.
     table = stack(drawn).map()
-    push = find_action(KnownScene(table), np.random.default_rng(0)).push
+    push = find_action(KnownScene(table), np.random.default_rng(0), BAR).push
     assert push.p_WE[2] > 0.044
     for least, above in ((0.9 * (1 - push.cost), True), (1.1 * (1 - push.cost), False)):
         parameters = FindActionParameters(gain=GainParameters(least=least))
-        decision = find_action(KnownScene(table), np.random.default_rng(0), parameters)
+        decision = find_action(KnownScene(table), np.random.default_rng(0), BAR, parameters)
         assert (decision.push.p_WE[2] > 0.044) == above

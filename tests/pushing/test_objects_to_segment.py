@@ -63,3 +63,19 @@ def test_the_rim_of_a_known_thing_does_not_count_towards_the_smallest_area(drawn
     assert not objects_to_segment(drawn.map(), too_much).any()
     wide = ObjectsToSegmentParameters(minimum_area=(14 * 11 - 0.5) * 4e-6, rim=0.0121)
     np.testing.assert_array_equal(objects_to_segment(drawn.map(), wide), unknown)
+
+
+def test_what_is_in_doubt_is_a_thing_from_the_smallest_area_on_whatever_its_id_and_where_it_touches(drawn):
+    # 1 and 2 touch and are of one width: each counts by itself, 1 with 10 x 12 cells of 2 mm, 2 with 12 fewer.
+    one, two = np.zeros((2, *drawn.objects.shape), bool)
+    one[140:150, 100:112] = two[150:159, 100:112] = True
+    drawn.put(one, 0.05, False, 1).put(two, 0.05, False, 2)
+    table = drawn.map()
+    exactly = ObjectsToSegmentParameters(minimum_area=120 * table.cell_area)
+    unmoved, doubtful = things_to_push(table, exactly)
+    assert not unmoved.any()
+    np.testing.assert_array_equal(doubtful, np.where(one, 1, 0))
+    more = ObjectsToSegmentParameters(minimum_area=120.5 * table.cell_area)
+    assert not things_to_push(table, more)[1].any()
+    less = ObjectsToSegmentParameters(minimum_area=108 * table.cell_area)
+    np.testing.assert_array_equal(things_to_push(table, less)[1], drawn.doubtful)

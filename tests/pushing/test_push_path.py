@@ -10,10 +10,11 @@ from riseg_drake.pushing.decision import PathStage
 from riseg_drake.pushing.find_action import find_action
 from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.pushing.push_path import PushPathParameters, plan_push_path
-from riseg_drake.pushing.pusher import Pusher
+from riseg_drake.pushing.pusher import PusherParameters
 from riseg_drake.pushing.tried_pushes import KnownScene
 from riseg_drake.robot.kinematics import observation_posture, observe_pose
 from riseg_drake.robot.limits import PANDA_LIMITS
+from tests.pushing.bar import BAR
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +26,8 @@ def planned(drawn, panda, q_observe):
     push = find_action(
         KnownScene(drawn.map()),
         np.random.default_rng(0),
-        plan_path=lambda push: plan_push_path(push, panda, q_observe, Pusher()),
+        BAR,
+        plan_path=lambda push: plan_push_path(push, panda, q_observe),
     ).push
     assert push is not NO_PUSH
     return push
@@ -89,7 +91,7 @@ def test_tip_never_comes_below_its_floor_and_crosses_above_everything(push, pand
         if np.linalg.norm(X_WE[:2, 3] - push.p_WE[:2]) > push.length + 1e-3:
             assert X_WE[2, 3] >= push.tallest + 0.01
     assert lowest == pytest.approx(push.tip_height, abs=2e-4)
-    assert lowest >= Pusher().lowest_tip_height - 2e-4
+    assert lowest >= PusherParameters().lowest_tip_height - 2e-4
 
 
 @pytest.mark.parametrize(("height", "tip"), [(0.005, 0.00225), (0.007, 0.00315)])
@@ -124,7 +126,7 @@ def test_phases_follow_each_other(push):
 
 def test_tip_rises_first_where_the_observation_posture_is_lower_than_things(push, panda, q_observe):
     tall = replace(push, tallest=0.16)
-    path = plan_push_path(tall, panda, q_observe, Pusher())
+    path = plan_push_path(tall, panda, q_observe)
     heights = [panda.X_WE(path.position(time)) for time in samples(path, 0.02)]
     for X_WE in heights:
         away = min(np.linalg.norm(X_WE[:2, 3] - p_W[:2]) for p_W in (push.p_WE, panda.X_WE(q_observe)[:3, 3]))
@@ -133,17 +135,11 @@ def test_tip_rises_first_where_the_observation_posture_is_lower_than_things(push
 
 @pytest.mark.parametrize("x", [0.95, 0.05])
 def test_push_out_of_reach_has_no_path(push, panda, q_observe, x):
-    assert (
-        plan_push_path(replace(push, p_WE=np.array([x, 0.1, 0.008])), panda, q_observe, Pusher())
-        is PathStage.POSTURE
-    )
+    assert plan_push_path(replace(push, p_WE=np.array([x, 0.1, 0.008])), panda, q_observe) is PathStage.POSTURE
 
 
 def test_things_as_tall_as_the_pusher_are_not_pushed(push, panda, q_observe):
-    assert (
-        plan_push_path(replace(push, tallest=0.27), panda, q_observe, Pusher())
-        is PathStage.ROOM_BELOW_THE_FLANGE
-    )
+    assert plan_push_path(replace(push, tallest=0.27), panda, q_observe) is PathStage.ROOM_BELOW_THE_FLANGE
 
 
 @pytest.fixture(scope="module")
@@ -194,13 +190,13 @@ def test_reaches_pushes_all_over_the_work_area(drawn, panda, q_observe, q_leanin
                 p_WE=np.append(p_W, 0.008),
                 direction_W=np.array([np.cos(angle), np.sin(angle)]),
             )
-            planned_count += isinstance(plan_push_path(push, panda, q_from, Pusher()), PushPath)
+            planned_count += isinstance(plan_push_path(push, panda, q_from), PushPath)
     assert planned_count >= (20 if leaning else 26)
 
 
 def test_path_that_takes_too_long_is_no_path(push, panda, q_observe):
     short = PushPathParameters(longest=push.path.duration - 0.1)
-    assert plan_push_path(push, panda, q_observe, Pusher(), short) is PathStage.DURATION
+    assert plan_push_path(push, panda, q_observe, short) is PathStage.DURATION
 
 
 def test_no_joint_leaps_between_samples(push):
@@ -211,5 +207,5 @@ def test_no_joint_leaps_between_samples(push):
 def test_slower_limits_take_longer(push, panda, q_observe):
     slow = PushPathParameters(longest=60.0)
     slow.limits.velocity = 0.2
-    path = plan_push_path(push, panda, q_observe, Pusher(), slow)
+    path = plan_push_path(push, panda, q_observe, slow)
     assert path.duration > push.path.duration

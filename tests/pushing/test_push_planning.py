@@ -9,6 +9,7 @@ from riseg_drake.pushing import push_planning
 from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.pushing.push_planning import PushPlanningParameters, _heading, plan_push
 from riseg_drake.robot.kinematics import READY
+from tests.pushing.bar import BAR
 
 Q = np.arange(7.0)
 
@@ -16,7 +17,7 @@ Q = np.arange(7.0)
 class Arm:
     """Its tip's x axis is not level, and so shorter from above."""
 
-    fixed_camera = None
+    fixed_camera, tool = None, BAR
 
     def X_WE(self, q):
         assert q is Q
@@ -46,22 +47,23 @@ def test_each_step_gets_what_it_asks_for_and_the_heading_is_the_tip_s_level_dire
     parameters, arm, rng, tried = PushPlanningParameters(), Arm(), np.random.default_rng(0), ("tried",)
     assert plan_push("frame", "above", "mask", Q, arm, rng, tried, parameters, "found") == "find_action"
     assert asked["map_table"] == ("frame", "above", "mask", parameters.action.table, "found")
-    known, generator, action, path_of = asked["find_action"]
+    known, generator, tool, action, path_of = asked["find_action"]
     assert (known.table, known.tried, generator) == ("map_table", tried, rng)
+    assert tool is arm.tool
     assert action is parameters.action
     np.testing.assert_allclose(known.heading_W, [0.6, -0.8])
     assert path_of("push") == "plan_push_path"
-    assert asked["plan_push_path"] == ("push", arm, Q, parameters.action.pusher, parameters.path)
+    assert asked["plan_push_path"] == ("push", arm, Q, parameters.path)
 
 
 def test_without_parameters_the_defaults_are_taken_and_given_ones_are_not_replaced(asked):
     plan_push("frame", "above", "mask", Q, Arm(), np.random.default_rng(0))
-    assert asked["find_action"][2] == PushPlanningParameters().action
+    assert asked["find_action"][3] == PushPlanningParameters().action
     assert asked["map_table"][4] is None
     given = PushPlanningParameters()
     given.action.paths = 3
     plan_push("frame", "above", "mask", Q, Arm(), np.random.default_rng(0), parameters=given)
-    assert asked["find_action"][2].paths == 3
+    assert asked["find_action"][3].paths == 3
 
 
 def test_no_push_has_the_shapes_of_a_push_and_can_never_be_the_cheapest():

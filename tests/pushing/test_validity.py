@@ -5,6 +5,7 @@ import pytest
 
 from riseg_drake.pushing.pusher import Pusher
 from riseg_drake.pushing.validity import ValidityParameters, is_valid_push, overlap_after_push
+from tests.pushing.bar import BAR
 
 ALONG_X = np.array([[1.0, 0.0]])
 B = np.array([[0.48, 0.0]])
@@ -12,7 +13,7 @@ CENTER = np.array([0.5, 0.0])
 
 
 def judge(drawn, cluster, center_W=CENTER):
-    return is_valid_push(B, ALONG_X, center_W, cluster, drawn.map(), Pusher(), ValidityParameters())
+    return is_valid_push(B, ALONG_X, center_W, cluster, drawn.map(), Pusher(BAR), ValidityParameters())
 
 
 @pytest.fixture
@@ -67,5 +68,5 @@ def test_overlap_counts_other_objects_only(drawn, box):
 def test_area_the_end_effector_needs_turns_with_the_push(drawn, box):
     drawn.box(0.455, 0.012, 0.01, 0.01)
     b_W, direction_W = np.array([[0.5, -0.02]]), np.array([[0.0, 1.0]])
-    validity = is_valid_push(b_W, direction_W, CENTER, box, drawn.map(), Pusher(), ValidityParameters())
+    validity = is_valid_push(b_W, direction_W, CENTER, box, drawn.map(), Pusher(BAR), ValidityParameters())
     assert validity.valid.all()

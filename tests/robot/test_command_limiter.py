@@ -112,6 +112,35 @@ def test_the_longest_stop_is_no_longer_than_said(robot):
     assert longest * PERIOD > 0.05  # the test has seen real stops
 
 
+@pytest.mark.parametrize("robot", [PANDA_LIMITS, FR3_LIMITS], ids=["panda", "fr3"])
+def test_the_longest_stop_is_ruckigs_from_full_speed_and_full_acceleration_the_wrong_way(robot):
+    limits, limiter = CommandLimits(), CommandLimiter(READY, robot)
+    stop = limiter._stop_from(
+        READY, limits.velocity * robot.velocity, limits.acceleration * robot.acceleration, limiter._braking
+    )
+    assert limits.longest_stop(robot) == pytest.approx(stop.duration, abs=1e-9)
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize(("spare", "followed"), [(1e-5, True), (-1e-5, False)])
+def test_an_acceleration_is_not_gone_on_with_where_taking_it_back_would_gather_too_much_speed(
+    sign, spare, followed
+):
+    limits, joint = CommandLimits(), 3
+    limiter = CommandLimiter(PANDA_LIMITS.position_middle, PANDA_LIMITS)
+    a = 0.9 * limits.acceleration * PANDA_LIMITS.acceleration[joint]
+    # Taken back with the greatest jerk j it gathers a^2 / 2j.
+    gathered = a**2 / (2 * limits.jerk * PANDA_LIMITS.jerk[joint])
+    v = limits.velocity * PANDA_LIMITS.velocity[joint] - gathered - spare - PERIOD * a
+    limiter.velocity[joint], limiter.acceleration[joint] = sign * v, sign * a
+    free = Target(
+        limiter.position + PERIOD * limiter.velocity + PERIOD**2 / 2 * limiter.acceleration,
+        limiter.velocity + PERIOD * limiter.acceleration,
+        limiter.acceleration,
+    )
+    assert (limiter._follow_linearly(free) is not None) is followed
+
+
 def in_fast_motion(robot):
     limiter = CommandLimiter(READY, robot, PERIOD)
     goal = READY + np.array([0.5, -0.4, 0.3, 0.2, 0.5, 0.4, -0.5])
@@ -221,6 +250,30 @@ def test_towards_the_end_of_an_fr3s_range_joints_are_no_faster_than_they_may_be_
     assert FR3_LIMITS.room(limiter.position).min() < 0.15  # it went there
     heedless, _ = speed_towards_an_end(replace(FR3_LIMITS, slowing_down=None), end)
     assert heedless > 1.2 * CommandLimits().velocity
+
+
+@pytest.mark.parametrize("end", [-1, 1])
+def test_on_the_way_to_the_end_of_a_range_a_joint_is_as_slow_as_at_the_slower_of_both_places_but_not_still(end):
+    limiter, share = CommandLimiter(FR3_LIMITS.position_middle, FR3_LIMITS), CommandLimits().velocity
+    goal = FR3_LIMITS.position_middle.copy()
+    goal[0] += end * (FR3_LIMITS.position_upper[0] - goal[0] - 0.2)
+    goal[4] += end * (FR3_LIMITS.position_upper[4] - goal[4] - 0.002)
+    assert limiter._approach(still(goal)) is not None
+    # 0.2 rad from its end joint 1 may do sqrt(2 * 6 * 0.2) - 0.3 rad/s, joint 5 so near to it nothing.
+    towards = share * FR3_LIMITS.velocity
+    towards[[0, 4]] = share * (np.sqrt(2.4) - 0.3), 1e-3
+    away = share * FR3_LIMITS.velocity
+    lowest, highest = (-away, towards) if end > 0 else (-towards, away)
+    np.testing.assert_allclose(limiter._way.min_velocity, lowest)
+    np.testing.assert_allclose(limiter._way.max_velocity, highest)
+
+
+def test_where_no_way_to_a_target_is_found_the_stop_is_gone_on_with_and_that_is_told(monkeypatch):
+    limiter = in_fast_motion(PANDA_LIMITS)
+    expected = limiter._stop.at_time(PERIOD)[0]
+    monkeypatch.setattr(limiter, "_approach", lambda target: None)
+    np.testing.assert_array_equal(limiter.follow(still(READY + 0.5)), expected)
+    assert limiter.held_back
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 
-from riseg_drake.robot.command_playout import COAST, CommandPlayout
+from riseg_drake.robot.command_playout import CommandPlayout
 
 START, PERIOD = 1_700_000_000.0, 0.005
+COAST = 0.02
 Q = np.linspace(-0.5, 0.5, 7)
 HERE = np.ones(7)
 

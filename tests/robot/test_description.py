@@ -102,7 +102,7 @@ def test_a_missing_folder_of_official_models_is_named():
 
 def test_pusher_and_camera_are_as_heavy_as_stated(ours):
     plant, parts = ours
-    masses = [plant.get_body(b).default_mass() for b in plant.GetBodyIndices(parts.pusher)]
+    masses = [plant.get_body(b).default_mass() for b in plant.GetBodyIndices(parts.tool)]
     assert sorted(masses) == [0.075, 0.25]
 
 

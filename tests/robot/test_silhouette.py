@@ -22,6 +22,7 @@ from riseg_drake.robot.kinematics import READY, PandaKinematics, observe_pose, t
 from riseg_drake.robot.silhouette import NEAR, RobotSilhouette, UnknownShapeError, hull_corners
 
 D415 = Intrinsics(640, 480, 616.285, 615.778, 301.418, 232.864)
+D405 = Intrinsics(640, 480, 433.0, 433.0, 319.5, 239.5)
 
 
 @pytest.fixture(scope="module")
@@ -30,14 +31,19 @@ def rendered_robot():
     return renderer_of_robot()
 
 
-def renderer_of_robot(X_WC=None):
-    """The same, for a camera fixed to the world at X_WC."""
+@pytest.fixture(scope="module")
+def hand():
+    return PandaKinematics(PandaDescription(tool="hand"))
+
+
+def renderer_of_robot(X_WC=None, tool="bar", camera=D415):
+    """The same, for a camera fixed to the world at X_WC, for another tool, and for another camera."""
     builder = RobotDiagramBuilder(time_step=0.0)
     plant, scene_graph = builder.plant(), builder.scene_graph()
-    frame = add_panda(plant, PandaDescription(), X_WC).camera_frame
+    frame = add_panda(plant, PandaDescription(tool=tool), X_WC).camera_frame
     plant.Finalize()
     scene_graph.AddRenderer("vtk", MakeRenderEngineVtk(RenderEngineVtkParams()))
-    k = D415
+    k = camera
     core = RenderCameraCore(
         "vtk",
         CameraInfo(k.width, k.height, k.fx, k.fy, k.cx, k.cy),
@@ -89,6 +95,17 @@ def test_with_margin_the_silhouette_covers_every_rendered_pixel_and_little_else(
         drawn, true = silhouette.mask(q), rendered_robot(q)
         assert (drawn & true).sum() == true.sum()
         assert (drawn & true).sum() / (drawn | true).sum() > 0.75
+
+
+@pytest.mark.renders
+def test_the_hand_is_drawn_where_drake_renders_it(hand):
+    rendered = renderer_of_robot(tool="hand", camera=D405)
+    bare, wide = RobotSilhouette(hand, D405, 0.0, 0.0), RobotSilhouette(hand, D405)
+    for q in postures(hand):
+        true = rendered(q)
+        assert true.any()
+        assert (bare.mask(q) & true).sum() / (bare.mask(q) | true).sum() > 0.96
+        assert (wide.mask(q) & true).sum() == true.sum()
 
 
 @pytest.mark.renders
@@ -144,3 +161,35 @@ def test_a_mesh_with_a_corner_that_is_nowhere_cannot_be_drawn(tmp_path):
     spike.write_text("v 0 0 0\nv 1e30 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n")
     with pytest.raises(UnknownShapeError, match="mesh"):
         hull_corners(Mesh(str(spike), 1.0))
+
+
+def drawn_square(left, top, size, margin):
+    """What is drawn of a square that stands at 2 m, whose corners are these pixels."""
+    silhouette = RobotSilhouette.__new__(RobotSilhouette)
+    silhouette._intrinsics, silhouette._margin_px = D415, margin
+    uv = np.array([[left, top], [left + size, top], [left + size, top + size], [left, top + size]])
+    z = 2.0
+    p_CQ = [[(u - D415.cx) / D415.fx * z, (v - D415.cy) / D415.fy * z, z] for u, v in uv]
+    image = np.zeros(D415.shape, np.uint8)
+    silhouette._draw(image, np.array(p_CQ))
+    return image
+
+
+def test_a_margin_reaches_into_the_picture_from_what_lies_beside_it_on_any_side():
+    # 3 pixels beside the picture, a margin of 5: three or four of it are left, and none from 8 beside it.
+    height, width = D415.shape
+    within = slice(200, 240)
+    for beside in (3, 8):
+        seen = [
+            drawn_square(-40 - beside, 200, 40, 5.0)[within].any(0).sum(),
+            drawn_square(width - 1 + beside, 200, 40, 5.0)[within].any(0).sum(),
+            drawn_square(200, -40 - beside, 40, 5.0)[:, within].any(1).sum(),
+            drawn_square(200, height - 1 + beside, 40, 5.0)[:, within].any(1).sum(),
+        ]
+        assert seen == pytest.approx([3.5 if beside == 3 else 0] * 4, abs=0.5)
+
+
+def test_of_a_square_its_own_pixels_are_drawn_without_a_margin():
+    rows, columns = np.nonzero(drawn_square(100, 50, 40, 0.0))
+    assert (columns.min(), columns.max(), rows.min(), rows.max()) == (100, 140, 50, 90)
+    assert len(rows) == 41 * 41

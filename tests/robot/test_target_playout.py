@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
 
 from riseg_drake.robot.target_playout import PlayoutParameters, TargetPlayout
 
@@ -98,6 +99,42 @@ def test_after_a_stop_it_goes_on_at_the_nearest_point_of_the_path():
     after = playout.advance(PERIOD)
     assert np.abs(after.position - ahead).max() < 0.01
     assert np.abs(after.velocity).max() < 0.05
+
+
+@pytest.mark.parametrize("rate", [1.0, 0.5])
+def test_between_uneven_targets_lies_the_cubic_whose_velocities_are_means_of_the_chords_beside_it(rate):
+    times = np.cumsum([0.0, 0.01, 0.02, 0.01, 0.04, 0.02, 0.01])
+    slope, bend = np.linspace(-0.3, 0.3, 7), np.linspace(0.5, -0.2, 7)
+    playout = TargetPlayout()
+    for t in times:
+        playout.add(t, slope * t + bend * t**2)
+    playout.rate = rate
+    gaps = np.diff(times)
+    # Of a parabola the chord over a gap is its velocity in the middle of it; at both ends it stands still.
+    unlike = (gaps[1:] - gaps[:-1]) / 2
+    v = np.zeros((7, 7))
+    v[1:-1] = slope + bend * (2 * times[1:-1] + unlike)[:, None]
+    a = np.zeros((7, 7))
+    a[1:-1] = 2 * bend
+    q = slope * times[:, None] + bend * times[:, None] ** 2
+    cubic = CubicHermiteSpline(times, q, v)
+    for k, start in enumerate(times[:-1]):
+        for share in (0.0, 0.3, 0.999):
+            target = playout._at(start + share * gaps[k])
+            np.testing.assert_allclose(target.position, cubic(start + share * gaps[k]), atol=1e-12)
+            expected = rate * cubic(start + share * gaps[k], 1)
+            np.testing.assert_allclose(target.velocity, expected, atol=1e-9)
+            blend = (1 - share) * a[k] + share * a[k + 1]
+            np.testing.assert_allclose(target.acceleration, rate**2 * blend, atol=1e-9)
+
+
+def test_the_first_target_is_played_out_late_by_the_delay_even_where_the_second_moves():
+    playout = TargetPlayout(PlayoutParameters(delay=0.5))
+    playout.add(1.0, np.zeros(7))
+    assert playout.time == pytest.approx(0.5)
+    playout.add(1.01, np.full(7, 1e-4))
+    assert playout.time == pytest.approx(0.5)
+    assert playout.in_motion
 
 
 def test_targets_out_of_order_are_refused():

@@ -5,16 +5,22 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from riseg_drake.geometry.se3 import exp_se3, inverse
+from riseg_drake.geometry.se3 import exp_se3, inverse, translation
+from riseg_drake.segmentation import belief as module
 from riseg_drake.segmentation.belief import (
+    Belief,
     BeliefParameters,
     Bodies,
     Origin,
     _most_seen,
+    bodies_of,
     carried_evidence,
     completed,
+    next_belief,
     rebased,
 )
+from riseg_drake.segmentation.observation import Observation, ObservationParameters
+from riseg_drake.segmentation.propagation import UNKNOWN
 
 
 def test_how_bodies_had_moved_when_the_reference_was_taken_is_told_since_the_new_keyframe():
@@ -136,3 +142,126 @@ def test_the_value_that_a_superpixel_shows_most_is_told():
         superpixels=SimpleNamespace(label=label), region=(slice(1, 4), slice(2, 6)), count=3
     )
     assert _most_seen(keyframe, image).tolist() == [7, 9, 0]
+
+
+STILL_AND_MOVED = np.array([np.eye(4), translation(np.array([0.02, 0, 0]))])
+
+
+def a_row_of_four(body, next_id=3, across=(False, False, False), area=(100, 100, 100, 100)):
+    """A belief of four superpixels in a row, of which the first two move and the others stand still."""
+    keyframe = SimpleNamespace(
+        count=4,
+        borders=np.array([[0, 1], [1, 2], [2, 3]]),
+        length=np.array([10.0, 20.0, 10.0]),
+        area=np.array(area),
+        across=np.array(across),
+        pixels_per_metre=1.0,
+    )
+    belief = SimpleNamespace(
+        keyframe=keyframe, bond=np.array([2.0, -1, 2]), body=np.array(body), next_id=next_id
+    )
+    nats = np.array([[50.0, 50, 0, 0], [0, 0, 50, 50]])
+    said = np.array([0.1, -0.2, 0.3])
+    seen = Observation(STILL_AND_MOVED, np.array([1, 1, 0, 0]), nats, said, np.ones(4), np.full(2, 0.5))
+    return belief, seen
+
+
+def told(belief, seen, before=None):
+    return bodies_of(belief, seen, before, BeliefParameters(), ObservationParameters())
+
+
+def test_what_has_no_one_motion_speaks_against_the_border_between_its_parts_by_its_length():
+    seen, bodies = told(*a_row_of_four([0, 0, 0, 0]))
+    # One motion costs both parts 100 nats, of which 60 are free: 40 over 20 pixels of border.
+    np.testing.assert_allclose(seen.evidence, [0.1, -0.2 - 2.0, 0.3])
+    assert (bodies.motion.tolist(), bodies.body.tolist(), bodies.next_id) == ([1, 1, 0, 0], [3, 3, 0, 0], 4)
+    np.testing.assert_array_equal(bodies.motions_K, STILL_AND_MOVED)
+
+
+@pytest.mark.parametrize(("area", "kept"), [((100, 100, 101, 99), 1), ((100, 100, 100, 100), 0)])
+def test_what_has_moved_before_by_more_than_half_of_its_area_is_a_body_though_it_stands_still(area, kept):
+    _, bodies = told(*a_row_of_four([0, 0, 1, 0], area=area))
+    assert bodies.body.tolist() == [3, 3, kept, kept]
+
+
+@pytest.mark.parametrize(
+    ("before", "next_id", "ids", "following"),
+    [
+        ([5, 5, 0, 0], 3, [5, 5, 0, 0], 6),  # it is what it was in the frame before
+        ([0, 0, 0, 7], 3, [8, 8, 0, 0], 9),  # 7 is gone, and nobody else's
+        ([0, 0, 0, 7], 9, [9, 9, 0, 0], 10),
+    ],
+)
+def test_ids_are_those_of_the_frame_before_and_new_ones_nobodys(before, next_id, ids, following):
+    before = Bodies(np.array(before), np.zeros(4, int), STILL_AND_MOVED, 99)
+    _, bodies = told(*a_row_of_four([0, 0, 0, 0], next_id), before)
+    assert (bodies.body.tolist(), bodies.next_id) == (ids, following)
+
+
+def test_across_a_gap_all_of_both_parts_says_what_they_are_and_elsewhere_each_superpixel(monkeypatch):
+    monkeypatch.setattr(module, "evidence_of_parts", lambda *_: np.array([9.0, -3.0, 9.0]))
+    seen, _ = told(*a_row_of_four([0, 0, 0, 0], across=(False, True, False)))
+    np.testing.assert_allclose(seen.evidence, [0.1, -3.0 - 2.0, 0.3])
+
+
+@pytest.mark.parametrize("watched", [True, False])
+def test_a_new_keyframe_knows_its_superpixels_by_what_the_old_ones_carry_and_what_is_remembered(
+    monkeypatch, watched
+):
+    """Four superpixels: the old 0, body 5, which moved, 1, which stood, 7 of memory, and nothing; 2 is gone."""
+    of_the_old = np.tile(np.array([1, 2, 0, UNKNOWN], np.uint16), (2, 1))
+    remembered = np.tile(np.array([0, 9, 7, UNKNOWN], np.uint16), (2, 1))
+    evidence = np.array([11.5, -11.5, 1.0])
+    old = Belief(
+        SimpleNamespace(count=3),
+        np.zeros(3),
+        evidence,
+        np.array([0, 1, 0]),
+        6,
+        np.arange(3),
+        np.arange(3)[None],
+    )
+    bodies = Bodies(np.array([5, 0, 6]), np.array([1, 0, 1]), STILL_AND_MOVED, 8)
+    new = SimpleNamespace(
+        superpixels=SimpleNamespace(label=np.tile(np.arange(4), (2, 1))),
+        region=(slice(0, 2), slice(0, 4)),
+        count=4,
+        area=np.array([2, 2, 3, 2]),
+    )
+    given = {}
+
+    def carry(belief, label, moves, *_):
+        given.update(label=label.tolist(), moves=moves)
+        return of_the_old
+
+    def keyframe(frame, above, noise, parameters, ids):
+        given["ids"] = ids
+        return new
+
+    def evidence_for(belief, keyframe, prior, origin, parameters):
+        given.update(old=belief, origin=origin)
+        return np.array([0.5])
+
+    monkeypatch.setattr(module, "_carry", carry)
+    monkeypatch.setattr(module, "make_keyframe", keyframe)
+    monkeypatch.setattr(module, "border_prior", lambda *_: np.array([1.0]))
+    monkeypatch.setattr(module, "carried_evidence", evidence_for)
+    monkeypatch.setattr(module, "partition", lambda keyframe, bond, parameters: np.array([0, 1, 2, 2]))
+    seen = SimpleNamespace(evidence=np.array([2.0, -2.0, 0.25])) if watched else None
+    belief = next_belief(old, seen, bodies, None, None, remembered, None, BeliefParameters())
+    assert given["label"] == [1, 2, 3]
+    assert list(given["moves"]) == [1, 3]
+    np.testing.assert_array_equal(given["moves"][1], STILL_AND_MOVED[1])
+    np.testing.assert_array_equal(given["ids"], np.tile([5, 0, 7, 0], (2, 1)))
+    origin = given["origin"]
+    assert origin.source.tolist() == [0, 1, -1, -1]
+    assert origin.body.tolist() == [5, 0, 7, 0]
+    assert origin.moved.tolist() == [True, False, False, False]
+    # What was seen adds up to no more than 12 nats either way.
+    np.testing.assert_array_equal(given["old"].evidence, [12.0, -12.0, 1.25] if watched else evidence)
+    np.testing.assert_array_equal(given["old"].body, [5, 0, 6])
+    assert belief.keyframe is new
+    assert (belief.prior.tolist(), belief.evidence.tolist(), belief.next_id) == ([1.0], [0.5], 8)
+    # What nothing is known of is of the part that it is in.
+    assert belief.body.tolist() == [5, 0, 7, 7]
+    assert belief.finer.shape == (3, 4)

@@ -1,19 +1,21 @@
 """From rest to rest: motions that nobody proposed are found."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
+from riseg_drake.segmentation import motion_search
 from riseg_drake.segmentation.belief import BeliefParameters, first_belief
 from riseg_drake.segmentation.comparison import Comparison
-from riseg_drake.segmentation.likelihood import motion_costs
+from riseg_drake.segmentation.likelihood import motion_costs, unexplained_parts
 from riseg_drake.segmentation.motion_search import (
     MotionSearchParameters,
     SearchProblem,
     _Search,
     missing_motion,
     search_motions,
-    unexplained_parts,
 )
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.noise import MeasurementNoise
@@ -205,3 +207,41 @@ def test_boxes_get_their_motions_and_borders_inside_them_hold():
     shared = [np.median(seen.evidence[~apart & (truth[a] == k)]) for k in (1, 2, 3)]
     assert shared == pytest.approx([np.log(1 / 0.2), np.log(1 / 0.8), np.log(1 / 0.2)], abs=0.3)
     assert shared[1] == pytest.approx(np.log(1 / 0.8), abs=0.05)
+
+
+def test_bodies_that_no_motion_explains_are_asked_what_they_did_the_worst_first_each_once(monkeypatch):
+    """Each superpixel is explained by one of two motions; of four bodies one is by one motion, too."""
+    bodies = np.array([[1, 1, 0, 0, 0, 0], [0, 0, 1, 1, 0, 0], [0, 0, 0, 1, 1, 0], [0, 0, 0, 0, 1, 1]], bool)
+    # By the first motion they fall short by 9, 24, 4 and 2, by the second by 8, 12, 16 and 11.
+    nats = np.array([[9.0, 0, 20, 4, 0, 2], [0.0, 8, 0, 12, 4, 7]])
+    asked, taken = [], []
+
+    class Search:
+        def __init__(self, problem, known_K):
+            self.found = []
+            still = np.zeros((1, 6))
+            self.costs = SimpleNamespace(point_count=still[0], misfit=still, nats=lambda likelihood: nats)
+
+        def densest_patch(self, among):
+            return among, np.full(6, np.inf)
+
+        def best_motion(self, patch, distance):
+            asked.append((patch.tolist(), distance.tolist()))
+            return f"motion {len(asked)}"
+
+        def take(self, motion, patch, *, distinct=True):
+            taken.append((motion, patch.tolist(), distinct))
+
+    monkeypatch.setattr(motion_search, "_Search", Search)
+    problem = SimpleNamespace(
+        compared=SimpleNamespace(keyframe=SimpleNamespace(count=6, area=np.ones(6))),
+        possible_bodies=lambda: bodies,
+        pixels_min=1.0,
+        gain_min=4.0,
+        parameters=MotionSearchParameters(),
+        likelihood=SimpleNamespace(correlated_gray=1.0),
+    )
+    assert len(search_motions(problem, np.empty((0, 4, 4)))) == 0
+    worst_first = bodies[[1, 0, 2]]  # 12, 8 and 4; 2 is less than a motion's price
+    assert asked == [(b.tolist(), np.where(b, 0.0, np.inf).tolist()) for b in worst_first]
+    assert taken == [(f"motion {k + 1}", b.tolist(), False) for k, b in enumerate(worst_first)]

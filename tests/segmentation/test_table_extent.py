@@ -179,3 +179,17 @@ def test_what_hides_the_table_by_a_hand_s_breadth_parts_it_not(apart: float, par
     wide = (u < 0.3) | (u >= 0.3 + apart)
     largest = _largest(wide, feet, TableExtentParameters().gap)
     np.testing.assert_array_equal(largest, wide if parts == 1 else u < 0.3)
+
+
+@pytest.mark.parametrize(
+    ("high", "parameters", "elsewhere"),
+    [(0.045, {}, False), (0.005, {}, True), (0.045, {"far": 0.01}, True), (0.005, {"far": 0.06}, False)],
+)
+def test_what_stands_farther_than_3_cm_beside_the_seen_table_is_elsewhere(high, parameters, elsewhere):
+    # Nothing is seen but the table, from its column 60 to 255, and what hides the floor beside it: of every
+    # tenth pixel 32 of 768, where 24 are enough. Higher up a pixel is smaller, and so nearer to the middle:
+    # of these, columns 50 and 260, feet are 2.5 and 2.7 cm from the table's, or 4.7; its map has cells of 1 cm.
+    height = np.full(CAMERA.shape, np.nan)
+    height[40:200, 60:256] = 0.0
+    height[40:200, 46:56] = height[40:200, 256:266] = high
+    assert (held(height, **parameters) is not None) is elsewhere

@@ -1,11 +1,19 @@
 """The table plane against closed forms."""
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 
 from riseg_drake.geometry.camera import rays
 from riseg_drake.geometry.plane import heights_above_plane
-from riseg_drake.segmentation.table_plane import PlaneFitParameters, _least_squares_plane, _worth, fit_plane
+from riseg_drake.segmentation.table_plane import (
+    NoPlaneError,
+    PlaneFitParameters,
+    _least_squares_plane,
+    _worth,
+    fit_plane,
+)
 from tests.geometry.planes import CAMERA, tilted_plane
 
 
@@ -129,3 +137,26 @@ def test_the_plane_of_least_squares_weighs_its_points() -> None:
     np.testing.assert_allclose(np.abs(plane_C[:3] @ normal), 1, atol=1e-9)
     assert plane_C[:3] @ repeated.mean(0) + plane_C[3] == pytest.approx(0, abs=1e-9)
     assert plane_C[3] > 0
+
+
+@pytest.mark.parametrize(("points", "first", "second"), [(2048, 131, 512), (8, 3, 3)])
+def test_a_sixteenth_of_the_points_asks_all_planes_a_quarter_the_best_eighth_and_what_is_far_counts_less(
+    monkeypatch: pytest.MonkeyPatch, points: int, first: int, second: int
+) -> None:
+    asked = []
+
+    def worth(planes, p_CQ, tolerance, nearness, parameters):
+        asked.append((len(planes), p_CQ[:, 2], nearness))
+        return _worth(planes, p_CQ, tolerance, nearness, parameters)
+
+    monkeypatch.setattr("riseg_drake.segmentation.table_plane._worth", worth)
+    depth = np.full(CAMERA.shape, 1.0, np.float32)
+    depth[:, 320:] = 3.0
+    with suppress(NoPlaneError):
+        fit_plane(depth, CAMERA, np.random.default_rng(0), PlaneFitParameters(points=points))
+    (all_planes, z, nearness), (kept, few_z, _) = asked
+    assert (len(z), len(few_z), kept) == (first, second, all_planes // 8 + 1)
+    # From 1.5 times the nearest fifth on, points count by the square of depth.
+    nearest = np.quantile(few_z, 0.2)
+    assert nearest == 1.0 or points < 100
+    np.testing.assert_allclose(nearness, np.minimum(1.0, (1.5 * nearest / z) ** 2))

@@ -4,7 +4,7 @@ Each cycle waits for the client's answer to the one before, however long that ta
 by wall time: the robot's clock goes by what was answered. Words on standard input make it fail; what it saw is
 written to the file of the first argument when it ends: one row a cycle, robot_mode, q_d [7], q [7].
 
-franka_server.py FILE.npy ADDRESS q1,...,q7 [wall]     from where; with `wall` it keeps to real time instead
+franka_server.py FILE.npy ADDRESS q1,...,q7 [paced]     from where; `paced`: no faster than real time
 """
 
 import os
@@ -61,19 +61,18 @@ from franka_sim.motion_limits import JOINT_VELOCITY_VIOLATION_INDEX  # noqa: E40
 
 USER_STOPPED, SPOKEN = 5, 10
 PATIENCE = 0.8  # s; libfranka itself gives up after one
+CATCHES_UP = 0.02  # s; of what it is late where it is paced
 
 
 class SteppedServer(FrankaSimServer):
     """The robot; see above."""
 
-    is_stepped = True
+    is_paced, due = False, 0.0
     lose, is_pressed, freezes = 0, False, False
 
     def _drain_gate(self, answer_deadline: float = 0.0) -> float:
         while self.freezes:
             time.sleep(0.1)
-        if not self.is_stepped:
-            return super()._drain_gate(answer_deadline)
         give_up = time.monotonic() + PATIENCE
         if self.lose:
             self.lose -= 1
@@ -87,6 +86,9 @@ class SteppedServer(FrankaSimServer):
         state = self.robot_state.state
         rows.append([state["robot_mode"], *state["q_d"], *state["q"]])
         self.physics_sim.step()
+        if self.is_paced:
+            self.due = max(self.due, time.monotonic() - CATCHES_UP) + 0.001
+            time.sleep(max(self.due - time.monotonic(), 0.0))
         if self.is_pressed:
             self.robot_state.state["robot_mode"] = USER_STOPPED
         return 0.0
@@ -157,19 +159,14 @@ server = SteppedServer(
     enforce_motion_limits=True,
     enforce_comm_constraints=True,
 )
-server.is_stepped = "wall" not in sys.argv
+server.is_paced = "paced" in sys.argv
 server.physics_sim.initialize_simulation()
 server.physics_sim.data.qpos[server.physics_sim.arm_qpos_adr] = start
 server.physics_sim.latest_joint_positions = start.copy()
 server.physics_sim.step()
-if server.is_stepped:
-    clock = types.SimpleNamespace(
-        **{name: getattr(time, name) for name in ("time", "perf_counter", "monotonic")}
-    )
-    clock.sleep = lambda seconds: None
-    state_stream.time = clock
-else:
-    threading.Thread(target=server.physics_sim.start, daemon=True).start()
+clock = types.SimpleNamespace(**{name: getattr(time, name) for name in ("time", "perf_counter", "monotonic")})
+clock.sleep = lambda seconds: None
+state_stream.time = clock
 server._bind_listener()
 threading.Thread(target=server.run_server, daemon=True).start()
 print("ready", flush=True)

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from riseg_drake.robot.command_playout import DELAY
 from riseg_drake.robot.kinematics import READY
 from riseg_drake.robot.limits import FR3_LIMITS, PANDA_LIMITS
 from riseg_drake.robot.supervisor import MOVE, REFLEX, USER_STOPPED
@@ -26,7 +25,7 @@ def stood_still(robot, ticks=50):
 @pytest.mark.parametrize("limits", [FR3_LIMITS, PANDA_LIMITS])
 def test_a_smooth_stream_at_200_hz_is_followed_20_ms_behind_within_a_tenth_of_a_milliradian(mode, limits):
     robot = DrivenRobot(mode, limits=limits).swing(1.5)
-    planned = [robot.planned(READY, WALL + k * TICK - DELAY)[0] for k in range(1, 1501)]
+    planned = [robot.planned(READY, WALL + k * TICK - 0.02)[0] for k in range(1, 1501)]
     # A tick later the robot is where it is told to be.
     assert np.abs(np.array(robot.path)[1:] - np.array(planned)[1:]).max() < 1e-4 + 0.32 * TICK
     assert robot.drive.state is Drive.FOLLOWING
@@ -103,6 +102,30 @@ def test_after_a_command_that_is_none_the_arm_brakes_within_limits_and_wants_a_w
     assert is_within_limits(robot)
 
 
+@pytest.mark.parametrize(("off", "state"), [(0.099, Drive.FOLLOWING), (0.101, Drive.REFUSED)])
+def test_joint_angles_may_begin_a_tenth_of_a_radian_from_where_the_arm_is_and_no_further(off, state):
+    robot = DrivenRobot()
+    for _ in range(600):
+        robot.tick(command("position", READY + off * np.array([0, 0, 1, 0, 0, 0, 0]), robot.now))
+    assert robot.drive.state is state
+    assert np.abs(robot.q - READY).max() == pytest.approx(off if state is Drive.FOLLOWING else 0.0, abs=1e-6)
+    assert is_within_limits(robot)
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize(("jump", "followed"), [(0.6, 1.0), (-0.6, 1.0), (0.4, 1e-3), (-0.4, 1e-3)])
+def test_a_clock_that_was_set_by_half_a_second_is_followed_at_once_and_less_within_a_second(
+    mode, jump, followed
+):
+    robot = DrivenRobot(mode)
+    before = robot.tick().status.utime
+    after = robot.tick(late=jump).status.utime
+    assert 1e-6 * (after - before) == pytest.approx(TICK + followed * jump, abs=1e-5)
+    for _ in range(1000):
+        last = robot.tick(late=jump).status.utime
+    assert 1e-6 * last - robot.now == pytest.approx(jump * (1 - 0.999**1001 * (followed < 1)), abs=1e-5)
+
+
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("age", [-0.2, 0.2, 3600.0])
 def test_stamps_that_are_not_of_now_move_nothing(mode, age):
@@ -147,6 +170,15 @@ def test_a_robot_that_stopped_is_told_as_it_is_and_recovered_at_a_word_that_came
     np.testing.assert_allclose(robot.tick().command, READY + 0.3 if mode == "position" else 0, atol=1e-12)
 
 
+@pytest.mark.parametrize(("age", "counts"), [(1.98, True), (2.02, False), (-0.09, True), (-0.11, False)])
+def test_a_word_counts_for_two_seconds_and_from_a_tenth_of_a_second_ahead(age, counts):
+    robot = DrivenRobot().swing(0.6)
+    robot.drive.lose(robot.now, "joint_reflex")
+    robot.robot_mode = REFLEX
+    robot.ticks += 3000
+    assert robot.tick(words=[word(robot.now - age)]).recover is counts
+
+
 @pytest.mark.parametrize("mode", MODES)
 def test_the_status_is_stamped_evenly_however_late_the_process_is_woken(mode):
     robot = DrivenRobot(mode)
@@ -160,10 +192,12 @@ def test_the_status_is_stamped_evenly_however_late_the_process_is_woken(mode):
 @pytest.mark.parametrize("mode", MODES)
 def test_told_to_end_in_motion_it_brakes_first(mode):
     robot = DrivenRobot(mode).swing(0.6)
+    at_once = int(np.ceil(robot.drive._limiter._stop.duration / TICK))
     robot.drive.end()
-    ticks = 0
+    ticks = 1
     while not robot.tick().finished:
         ticks += 1
-    assert 5 < ticks < STOP
+    assert ticks == at_once
+    assert at_once > 5
     assert stood_still(robot.wait(60))
     assert is_within_limits(robot)

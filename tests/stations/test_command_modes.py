@@ -13,7 +13,6 @@ from riseg_drake.app.planned_speed import planned_limits
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.pushing.push import Push
 from riseg_drake.pushing.push_path import PlannedSpeed, PushPathParameters, plan_push_path
-from riseg_drake.pushing.pusher import Pusher
 from riseg_drake.robot.command_stream import CommandParameters
 from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import PandaKinematics, observe_pose
@@ -60,7 +59,7 @@ def planned_run(name):
             tallest=0.08,
             cost=0.0,
         )
-        path = plan_push_path(push, kinematics, q_observe, Pusher(), parameters)
+        path = plan_push_path(push, kinematics, q_observe, parameters)
         if path is not None:
             paths.append(path.trajectory)
     return q_observe, paths

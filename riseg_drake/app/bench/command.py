@@ -6,11 +6,14 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+import numpy as np
 from rich.console import Console
 
+from riseg_drake.app.bench.pair_times import PairTimes
 from riseg_drake.app.bench.recorded_push import StationOutputs, push_images, put_through
 from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.output import stage_figures
+from riseg_drake.app.output_folder import to_json, write_told
 from riseg_drake.app.run.command import peak_memory_mb
 from riseg_drake.app.scenario import Scenario, load_scenario
 from riseg_drake.app.segmentation_block import make_segmentation, panda_view
@@ -20,16 +23,20 @@ from riseg_drake.systems.stage_clock import StageClock
 
 REPETITIONS = 4
 """How often the push is gone through for times."""
-WHOLE = "whole pair"
 
 
 def bench_command(
-    scenario_file: Path | None, seed: int, stream: int | None, sam: bool, console: Console
+    scenario_file: Path | None,
+    seed: int,
+    stream: int | None,
+    sam: bool,
+    json_file: Path | None,
+    console: Console,
 ) -> None:
     """Render one push, put it through the segmentation again and again, print what it cost.
 
-    With `stream` say instead how evenly commands come for so many seconds beside that, with `sam` what frames
-    lose while Segment Anything works beside them.
+    The figures go to `json_file`, too, if one is named. With `stream` say instead how evenly commands come for
+    so many seconds beside that, with `sam` what frames lose while Segment Anything works beside them.
     """
     scenario = load_scenario(scenario_file)
     _ = scenario.simulated  # says so where it is not
@@ -47,25 +54,32 @@ def bench_command(
 
         return bench_sam(scenario, images, console)
     with console.status("measuring time"):
-        clock = StageClock()
+        clock, pairs = StageClock(), PairTimes()
         for _ in range(REPETITIONS):
-            _segment(scenario, images, clock)
+            _segment(scenario, images, clock, pairs)
     with console.status("measuring memory"):
         memory = _StageMemory()
         tracemalloc.start()
-        _segment(scenario, images, memory)
+        segment_once(scenario, images, memory)
         tracemalloc.stop()
     stages = stage_figures(clock.seconds)
     for stage, peaks in memory.peaks.items():
         stages[stage]["peak_mb"] = max(peaks) / 1e6
-    camera = scenario.station.camera.intrinsics
+    camera, of_pairs = scenario.station.camera.intrinsics, pairs.figures()
     console.print(
-        stage_table(stages, f"Alg. 2 for one {camera.width}x{camera.height} image pair, during a push")
+        stage_table(
+            {**stages, **of_pairs}, f"Alg. 2 for one {camera.width}x{camera.height} image pair, during a push"
+        )
     )
+    for line in pairs.said():
+        console.print(line)
     console.print(
         f"peak MB is what a stage allocates in Python while it works; "
         f"the whole process, simulation and all, took {peak_memory_mb()} MB at most"
     )
+    if json_file is not None:
+        figures = {"size": [camera.width, camera.height], "seed": seed, "stages": stages, "pairs": of_pairs}
+        write_told(json_file, to_json({**figures, "peak_memory_mb": peak_memory_mb()}).encode())
 
 
 class _StageMemory(StageClock):
@@ -86,20 +100,27 @@ class _StageMemory(StageClock):
             self.peaks.setdefault(stage, []).append(peak - before)
 
 
-def segment_once(scenario: Scenario, images: Sequence[StationOutputs]) -> None:
-    """Put the images through Alg. 2, as fast as it goes."""
-    _segment(scenario, images, StageClock())
+def segment_once(scenario: Scenario, images: Sequence[StationOutputs], clock: StageClock | None = None) -> None:
+    """Put the images through Alg. 2, as fast as it goes, and book what each stage takes."""
+    _segment(scenario, images, clock or StageClock(), None)
 
 
-def _segment(scenario: Scenario, images: Sequence[StationOutputs], clock: StageClock) -> None:
+def _segment(
+    scenario: Scenario, images: Sequence[StationOutputs], clock: StageClock, pairs: PairTimes | None
+) -> None:
     """Put the images through Alg. 2, one tick of the camera each, and book every stage and the whole."""
     period = 1 / scenario.station.camera.rate
     view = panda_view(scenario, PandaKinematics(scenario.station.panda, scenario.station.camera.fixed_pose))
     diagram, stages = make_segmentation(scenario, view, period, seed=0)
+    groups = diagram.GetOutputPort("groups")
     after_each = put_through(diagram, images, period)
     next(after_each)  # the first frame has no partner, and fills what is computed once for all
     clock.watch(stages)
-    for _ in images[1:]:
+    colors = [np.array(each["color_image"].get_value().data[..., :3]) for each in images] if pairs else []
+    for number in range(1, len(images)):
         start = perf_counter()
-        next(after_each)
-        clock.seconds[WHOLE].append(perf_counter() - start)
+        context = next(after_each)
+        seconds = perf_counter() - start
+        if pairs:
+            pairs.book(seconds, moves=groups.Eval(context).flow_span >= scenario.frame_pair.moving)
+            pairs.measure_flow(colors[number - 1], colors[number])

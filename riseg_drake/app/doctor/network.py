@@ -4,7 +4,14 @@ import time
 from collections import Counter
 
 from riseg_drake.app.doctor.finding import Finding
-from riseg_drake.stations.lcm_channels import LcmConfig, LcmError, open_lcm, receive_buffer_warning
+from riseg_drake.stations.lcm_channels import (
+    ARM_DRIVERS,
+    CAMERA_DRIVERS,
+    LcmConfig,
+    LcmError,
+    open_lcm,
+    receive_buffer_warning,
+)
 
 CHANNEL = "RISEG_DOCTOR"
 """Where it speaks to itself."""
@@ -50,13 +57,16 @@ def drivers(config: LcmConfig) -> list[Finding]:
             lcm.HandleSubscriptions(50)
     except (LcmError, RuntimeError):  # the line above has said so
         pass
-    wanted = {config.status_channel: "drake-franka-driver", config.image_channel: "realsense_rgbd_publisher"}
+    wanted = {
+        config.status_channel: ("arm's driver", ARM_DRIVERS),
+        config.image_channel: ("camera's driver", CAMERA_DRIVERS),
+    }
     findings = []
-    for channel, program in wanted.items():
+    for channel, (about, programs) in wanted.items():
         rate = count.pop(channel, 0) / LISTENING
         says = f"{channel} at {rate:.0f} Hz" if rate else f"nothing on {channel}"
-        remedy = "" if rate else f"only `riseg hardware` needs it: start {program}, or `riseg emulate`"
-        findings.append(Finding(program, rate > 0, says, remedy))
+        remedy = "" if rate else f"only `riseg hardware` needs it: start {programs}, or `riseg emulate`"
+        findings.append(Finding(about, rate > 0, says, remedy))
     if others := sorted(set(count) - {CHANNEL}):
         findings.append(Finding("also heard on LCM", True, ", ".join(others)))
     return findings

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.trajectories import PiecewisePolynomial
 
+from riseg_drake.app.hardware.drivers import with_reasons
 from riseg_drake.app.hardware.terminal_operator import TerminalOperator
 from riseg_drake.geometry.se3 import translation
 from riseg_drake.pushing.time_law import SpeedLimits, minimum_jerk, rest_to_rest
 from riseg_drake.robot.kinematics import MIN_CLEARANCE, PandaKinematics
 from riseg_drake.robot.supervisor import Cause, Mode
 from riseg_drake.stations.command_process import CommandProcess
-from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.hardware import TARGET_PERIOD
 from riseg_drake.stations.lcm_reception import Reception
 
@@ -35,8 +35,9 @@ def told(cause: Cause) -> str:
     """Why the arm does not move, and what to do about it where the cause alone does not say that."""
     if cause is Cause.STATUS_OLD:
         return (
-            f"{cause.value}; a driver that has ended must be started again, with station.command.mode as its "
-            "--control_mode (with another one it ends at the first command)"
+            f"{cause.value}; a driver that has ended must be started again: `riseg drive-arm`, or "
+            "drake-franka-driver with station.command.mode as its --control_mode (with another one it ends at "
+            "the first command)"
         )
     return cause.value
 
@@ -59,8 +60,8 @@ class WayBack:
     """To where the arm looks from, from wherever somebody has put it: planned by one, begun by another."""
 
     ABOVE = 0.25
-    """Things on the table are lower than this, m, or the pusher would be too short for them: the tip goes so
-    high before it goes anywhere else ..."""
+    """Things on the table are taken to be lower than this, m: the tip goes so high before it goes anywhere
+    else ..."""
     RISE, HIGHEST = 0.02, 0.5
     """... and up to the other height where the straight way is not free before, each time by the one, m."""
 
@@ -123,7 +124,7 @@ def travel(
     Raises TravelError if the arm is stopped on its way and the operator does not want it to go on.
     """
     assert reception.status is not None
-    stop = _travel_once(plan(reception.status.position), commands, reception.clock, look, operator.tell)
+    stop = _travel_once(plan(reception.status.position), commands, reception, look, operator.tell)
     while stop:
         said = operator.released(stop)
         if said is None:
@@ -138,18 +139,19 @@ def travel(
                 continue
             commands.release(anew=True)
             commands.begin_path()
-            stop = _travel_once(motion, commands, reception.clock, look, operator.tell)
+            stop = _travel_once(motion, commands, reception, look, operator.tell)
 
 
 def _travel_once(
     motion: PiecewisePolynomial,
     commands: CommandProcess,
-    clock: EvenClock,
+    reception: Reception,
     look: Callable[[], None],
     tell: Callable[[str], None],
 ) -> str:
     """Why the arm was stopped on its way, in a line; empty where it has arrived; else raises TravelError."""
-    start, duration = clock(), motion.end_time()
+    clock, duration = reception.clock, motion.end_time()
+    start = clock()
     for t in np.arange(0, duration + LINGER, TARGET_PERIOD):
         commands.send_target(start + t, motion.value(min(t, duration))[:, 0])
     goal = motion.value(duration)[:, 0]
@@ -161,7 +163,7 @@ def _travel_once(
         report = commands.report
         if report is None or report.words != commands.words:  # it is of before the operator's word
             continue
-        stop = f"the arm is stopped: {told(report.state.cause)}"
+        stop = f"the arm is stopped: {with_reasons(told(report.state.cause), reception)}"
         if report.state.mode is Mode.ENDED:
             raise TravelError(stop)
         if report.state.mode is Mode.STOPPED:

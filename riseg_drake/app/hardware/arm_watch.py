@@ -7,6 +7,7 @@ from pydrake.systems.framework import Context
 
 from riseg_drake.app.diagram import WiredDiagram
 from riseg_drake.app.hardware.arm_travel import TravelError, WayBack, told
+from riseg_drake.app.hardware.drivers import with_reasons
 from riseg_drake.app.hardware.terminal_operator import TerminalOperator
 from riseg_drake.app.run.interactions import Progress
 from riseg_drake.pushing.arm_path import ArmPhase
@@ -14,6 +15,7 @@ from riseg_drake.pushing.push import NO_PUSH, Push
 from riseg_drake.robot.supervisor import Cause, Mode
 from riseg_drake.stations.command_process import CommandProcess
 from riseg_drake.stations.command_session import StreamReport
+from riseg_drake.stations.lcm_reception import Reception
 
 CONTACT_MARGIN = 0.3
 """Before and after a push contact is still no surprise, s."""
@@ -31,13 +33,15 @@ class ArmWatch:
         self,
         wired: WiredDiagram,
         commands: CommandProcess,
+        reception: Reception,
         operator: TerminalOperator,
         progress: Progress,
         way_back: WayBack,
         off_path: float,
     ):
         """`off_path` is how far from its path the arm may go on with it, rad."""
-        self._wired, self._commands, self._operator, self._progress = wired, commands, operator, progress
+        self._wired, self._commands, self._reception = wired, commands, reception
+        self._operator, self._progress = operator, progress
         self._way_back, self._off_path = way_back, off_path
         self._push = NO_PUSH
         self._next = 0.0
@@ -87,7 +91,7 @@ class ArmWatch:
 
     def _ask(self, report: StreamReport) -> None:
         """Have the operator say how it goes on after a stop."""
-        cause = report.state.cause.value
+        cause = with_reasons(report.state.cause.value, self._reception)
         said = self._operator.released(f"the arm is stopped: {cause}")
         if said is None:
             return

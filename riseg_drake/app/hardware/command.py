@@ -184,7 +184,9 @@ class _Session:
                 )
                 listeners.append(stack.enter_context(recording))
             off_path = self._config.command.safety.off_path
-            watch = ArmWatch(wired, commands, self._operator, self._progress, way_back, off_path)
+            watch = ArmWatch(
+                wired, commands, self._reception, self._operator, self._progress, way_back, off_path
+            )
             try:
                 self._interact(wired, lambda context: watch(context) or self._is_silent(PATIENCE), listeners)
             finally:
@@ -233,7 +235,7 @@ class _Session:
         with ExitStack() as stack:
             status = stack.enter_context(self._console.status("looking"))
             narrator, clock = Narrator(self._console, status), StageClock()
-            robot = PandaKinematics(self._config.panda)
+            robot = PandaKinematics(self._config.panda, self._config.camera.fixed_pose)
             log = stack.enter_context(self._timeline.opened(self._folder.path.name, robot))
             listeners = [
                 lambda *_: narrator.follow(self._progress),

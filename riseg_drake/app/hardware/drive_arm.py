@@ -17,15 +17,13 @@ from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import PandaKinematics
 from riseg_drake.robot.limits import RobotLimits
 from riseg_drake.stations.arm_drive import ArmDrive
-from riseg_drake.stations.drive_process import DriveProcess
+from riseg_drake.stations.drive_process import PRIORITY, DriveProcess
 from riseg_drake.stations.franka_link import FrankaLink, Link, LinkError, RobotStopped
 from riseg_drake.stations.lcm_channels import open_lcm
 from riseg_drake.stations.promptness import be_prompt
 
 CHECKED_FOR = 5.0
 """`--check` reads for so long, s."""
-PRIORITY = 80
-"""Among real-time processes, where the system allows that: before the one that sends commands."""
 LOAD, LOAD_CENTER = 0.05, 0.02
 """By how much the load that is set in Desk may differ from the scenario's tool, kg and m."""
 SLOWEST_RATE = 990.0
@@ -48,7 +46,7 @@ def drive_arm_command(request: DriveRequest, console: Console) -> None:
     robot, mode = config.panda.robot, request.mode or config.command.mode
     link = FrankaLink(robot, request.ip)
     if request.check:
-        checks = Checks(link, config.panda)
+        checks = Checks(link, config.panda, X_WC=config.camera.fixed_pose)
         for line in checks.lines():
             console.print(line)
         if checks.problems:
@@ -69,9 +67,8 @@ def drive_arm_command(request: DriveRequest, console: Console) -> None:
     with _ended_by_signals(process):
         be_prompt(PRIORITY)
         process.run()
-    if process.cycles:
-        p50, p999 = 1e3 * np.percentile(process.cycles, [50, 99.9])
-        console.print(f"drive-arm: work of a cycle {p50:.2f} ms (median), {p999:.2f} ms (99.9 % are shorter)")
+    if process.cycles.count:
+        console.print(f"drive-arm: work of a cycle {process.cycles.told()}")
 
 
 class _ended_by_signals:  # noqa: N801 - is read as a context manager
@@ -94,9 +91,15 @@ class _ended_by_signals:  # noqa: N801 - is read as a context manager
 class Checks:
     """Reads a robot for a while, and moves nothing; `problems` are what keeps it from being driven."""
 
-    def __init__(self, link: Link, panda: PandaDescription, seconds: float = CHECKED_FOR):
-        """`seconds` is for how long it reads, s."""
-        self._link, self._panda, self._seconds = link, panda, seconds
+    def __init__(
+        self,
+        link: Link,
+        panda: PandaDescription,
+        seconds: float = CHECKED_FOR,
+        X_WC: np.ndarray | None = None,
+    ):
+        """`seconds` is for how long it reads, s; with X_WC [4, 4] the camera is there, and not on the tool."""
+        self._link, self._panda, self._X_WC, self._seconds = link, panda, X_WC, seconds
         self.problems: list[str] = []
 
     def lines(self) -> list[str]:
@@ -133,7 +136,7 @@ class Checks:
 
     def _load(self) -> str:
         mass, center = self._link.load()
-        tool_mass, tool_center = tool_load(self._panda)
+        tool_mass, tool_center = tool_load(self._panda, self._X_WC)
         words = (
             f"load set in Desk: {mass:.2f} kg at {_listed(center)} m from the flange; the scenario's tool: "
             f"{tool_mass:.2f} kg at {_listed(tool_center)} m"
@@ -146,12 +149,15 @@ class Checks:
         return words
 
 
-def tool_load(panda: PandaDescription) -> tuple[float, np.ndarray]:
-    """Mass of a scenario's tool, kg, and its centre from the flange (panda_link8), m [3]."""
-    kinematics = PandaKinematics(panda)
+def tool_load(panda: PandaDescription, X_WC: np.ndarray | None = None) -> tuple[float, np.ndarray]:
+    """Mass of a scenario's tool, kg, and its centre from the flange (panda_link8), m [3].
+
+    With X_WC [4, 4] the camera is there, and not on the tool.
+    """
+    kinematics = PandaKinematics(panda, X_WC)
     plant = kinematics.plant
     context = plant.CreateDefaultContext()
-    tool = [kinematics.parts.pusher]
+    tool = [kinematics.parts.tool]
     p_WTool = plant.CalcCenterOfMassPositionInWorld(context, tool)
     X_WF = plant.GetFrameByName("panda_link8", kinematics.parts.arm).CalcPoseInWorld(context)
     return float(plant.CalcTotalMass(context, tool)), np.array(X_WF.inverse().multiply(p_WTool))

@@ -11,7 +11,7 @@ from riseg_drake.app.run.interactions import TruthSource
 from riseg_drake.app.run.truth_reception import TruthReception
 from riseg_drake.robot.supervisor import MOVE
 from riseg_drake.stations.hardware import HardwareStationConfig
-from riseg_drake.stations.lcm_channels import open_lcm
+from riseg_drake.stations.lcm_channels import ARM_DRIVERS, CAMERA_DRIVERS, open_lcm
 from riseg_drake.stations.lcm_images import ImageError, decode_images
 from riseg_drake.stations.lcm_reception import Reception
 
@@ -26,11 +26,12 @@ class HardwareError(RuntimeError):
 
 
 _MODES = {
-    lcmt_panda_status.kOther: "other",
-    lcmt_panda_status.kIdle: "idle: is the driver started with --control_mode=position or velocity?",
+    lcmt_panda_status.kOther: f"other: start {ARM_DRIVERS} again",
+    lcmt_panda_status.kIdle: "idle: start `riseg drive-arm`, or drake-franka-driver with "
+    "--control_mode=position or velocity",
     lcmt_panda_status.kGuiding: "guided by hand: let go of the guiding buttons",
-    lcmt_panda_status.kReflex: "reflex: unlock the robot in Desk and start the driver again",
-    lcmt_panda_status.kUserStopped: "user stopped: release the user stop and start the driver again",
+    lcmt_panda_status.kReflex: f"reflex: unlock the robot in Desk and start {ARM_DRIVERS} again",
+    lcmt_panda_status.kUserStopped: f"user stopped: release the user stop and start {ARM_DRIVERS} again",
     lcmt_panda_status.kAutomaticErrorRecovery: "recovering from an error",
 }
 """What a person does about each `robot_mode` in which the arm takes no commands."""
@@ -75,21 +76,27 @@ def wait_for_drivers(
         time.sleep(0.02)
 
 
+def with_reasons(line: str, reception: Reception) -> str:
+    """A line on why the arm does not move, with what its driver says about that, where it says something."""
+    return f"{line}; its driver says: {reception.driver_says}" if reception.driver_says else line
+
+
 def _what_is_missing(reception: Reception, config: HardwareStationConfig, ready: bool) -> str:
     """What keeps a run from beginning; empty if nothing does. Raises ImageError."""
     silent = []
     if reception.status is None:
-        silent.append(f"{config.lcm.status_channel} (is drake-franka-driver running?)")
+        silent.append(f"{config.lcm.status_channel} (is {ARM_DRIVERS} running?)")
     if not reception.pictures:
-        silent.append(f"{config.lcm.image_channel} (is realsense_rgbd_publisher running, with that serial?)")
+        silent.append(f"{config.lcm.image_channel} (is {CAMERA_DRIVERS} running, with that serial?)")
     if silent:
         return f"nothing came on {' nor on '.join(silent)}"
     status = reception.status
     assert status is not None
     if ready and reception.clock() - status.time > ENDED:
-        return f"{config.lcm.status_channel} has ended (start drake-franka-driver again), and nothing more came"
+        return f"{config.lcm.status_channel} has ended (start {ARM_DRIVERS} again), and nothing more came"
     if ready and status.robot_mode != MOVE:
-        return f"robot_mode is {status.robot_mode} ({_MODES[status.robot_mode]}), and did not change"
+        why = with_reasons(_MODES[status.robot_mode], reception)
+        return f"robot_mode is {status.robot_mode} ({why}), and did not change"
     newest = reception.newest_picture(after=-np.inf)
     if newest is None:
         return "no picture came that can be used"

@@ -27,12 +27,12 @@ class PlannedMotion:
     def __init__(self, scenario: Scenario, meshcat: Meshcat, clock: Callable[[], float]):
         """`clock` tells wall time as the diagram counts it, s: a replay keeps the motion at that time."""
         self._meshcat, self._clock = meshcat, clock
-        panda = scenario.hardware.panda
-        self._kinematics = PandaKinematics(panda)
+        panda, X_WC = scenario.hardware.panda, scenario.hardware.camera.fixed_pose
+        self._kinematics = PandaKinematics(panda, X_WC)
         self._push: Push | None = None
         self._since = 0.0
         builder = DiagramBuilder()
-        angles = add_arm_view(builder, panda, meshcat, MeshcatVisualizerParams(prefix=f"{PATH}/arm"))
+        angles = add_arm_view(builder, panda, X_WC, meshcat, MeshcatVisualizerParams(prefix=f"{PATH}/arm"))
         builder.ExportInput(angles, "position")
         self._diagram = builder.Build()
         self._context = self._diagram.CreateDefaultContext()

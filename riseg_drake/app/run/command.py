@@ -110,7 +110,10 @@ def run(
             listeners.append(export_listener(wired, stack.enter_context(exporting(exports, folder.note))))
         if timeline is not None:
             log = stack.enter_context(
-                timeline.opened(folder.path.name, PandaKinematics(scenario.station.panda))
+                timeline.opened(
+                    folder.path.name,
+                    PandaKinematics(scenario.station.panda, scenario.station.camera.fixed_pose),
+                )
             )
             listeners.append(timeline_listener(wired, log, clock))
         if meshcat is not None:

@@ -21,10 +21,11 @@ class Desk:
         self.now, self.answer, self.push, self.doing = 50.0, answer, NO_PUSH, ArmPhase.OBSERVE
         self.told, self.contacts, self.releases, self.words = [], [], [], 0
         self.off_path, self.way, self.planned_from = 0.0, 3.0, None
+        self.driver_says = ""
         self.progress = Progress()
         self.report = SimpleNamespace(state=SafetyState(Mode.FOLLOWING), refused="")
         monkeypatch.setattr(arm_watch.time, "monotonic", lambda: self.now)
-        self.watch = ArmWatch(self, self, self, self.progress, self, off_path=0.02)
+        self.watch = ArmWatch(self, self, self, self, self.progress, self, off_path=0.02)
 
     # the diagram
     def read(self, name, context):
@@ -86,6 +87,16 @@ def test_a_stop_goes_on_at_the_operators_word_only(monkeypatch, answer, releases
     assert desk.releases == releases
     assert Cause.FORCE.value in desk.told[0]
     assert (Cause.FORCE.value in desk.progress.end) is ends
+
+
+@pytest.mark.parametrize("answer", [None, False])
+def test_what_the_driver_says_about_a_stop_is_part_of_the_question_and_of_the_end(monkeypatch, answer):
+    desk = Desk(monkeypatch, answer)
+    desk.driver_says = "the robot takes no commands: joint_reflex"
+    desk.look(Mode.STOPPED, Cause.REFLEX)
+    line = f"the arm is stopped: the arm stopped by reflex; its driver says: {desk.driver_says}"
+    assert desk.told == [line]
+    assert desk.progress.end == ("" if answer is None else line.replace("is stopped", "was stopped"))
 
 
 @pytest.mark.parametrize(

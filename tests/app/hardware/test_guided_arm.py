@@ -24,6 +24,8 @@ from tests.systems.scripted_eyes import Q_OBSERVE, THERE, Eyes, Script, push_to
 class Room:
     """All of `riseg hardware` but camera, segmentation and processes; the operator waits until `says`."""
 
+    driver_says = ""
+
     def __init__(self, monkeypatch, mode):
         self.lab = Lab(mode, noise=1e-4, q=Q_OBSERVE)
         self.words, self.told, self.says = 0, [], None
@@ -45,7 +47,7 @@ class Room:
         self.root = self.simulator.get_mutable_context()
         self.root.SetTime(self.lab.now)
         self.progress = Progress()
-        self.watch = ArmWatch(self, self, self, self.progress, self.way_back, off_path=0.02)
+        self.watch = ArmWatch(self, self, self, self, self.progress, self.way_back, off_path=0.02)
         self.simulator.Initialize()
 
     def run(self, seconds):
@@ -160,6 +162,8 @@ def test_an_arm_that_was_led_away_in_a_push_comes_back_at_the_operators_word_and
 class FirstWay:
     """What `travel` deals with, in one; the clock turns where it sleeps."""
 
+    driver_says = ""
+
     def __init__(self, monkeypatch, mode):
         self.lab = Lab(mode, q=Q_OBSERVE - 0.2)
         self.words, self.told, self.deeds = 0, [], []
@@ -233,8 +237,9 @@ def test_on_its_very_first_way_too_a_stopped_arm_goes_on_at_the_operators_word_f
 @pytest.mark.parametrize("mode", ["velocity"])
 def test_where_the_operator_does_not_want_it_the_first_way_ends_there_with_the_reason(first_way):
     first_way.deeds = [lambda: False]
+    first_way.driver_says = "the robot takes no commands: joint_reflex"
     looks = iter(range(10**6))
-    with pytest.raises(TravelError, match="pushes against the arm"):
+    with pytest.raises(TravelError, match=r"pushes against the arm .*; its driver says: .*: joint_reflex"):
         travel(
             plan_to_observe,
             first_way,

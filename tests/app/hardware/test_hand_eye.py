@@ -114,23 +114,28 @@ def test_before_a_fixed_camera_the_arm_shows_itself_over_the_work_area(watched):
         assert np.count_nonzero(silhouette.mask(q) & ~base) > 1.5 * LEAST * base.size
 
 
-def seen_from(kinematics, X_WC, q, intrinsics):
-    """A picture of the arm 0.3 m before a wall, from where the camera really is, drawn by `kinematics`."""
-    really = PandaKinematics(PandaDescription(), X_WC)
-    depth = np.where(RobotSilhouette(really, intrinsics, 0, 0).mask(q), 0.7, 1.0).astype(np.float32)
-    color = np.full((*intrinsics.shape, 3), 90, np.uint8)
-    drawn = RobotSilhouette(kinematics, intrinsics, 0, 0).mask(q)
-    return Frame(0, 0.0, intrinsics, color, depth, kinematics.X_WC(q), drawn)
+@pytest.fixture(scope="module")
+def drawn(watched):
+    """The arm's pixels [H, W] in each of these postures, as it is drawn."""
+    config, kinematics, postures = watched
+    silhouette = RobotSilhouette(kinematics, config.camera.intrinsics, 0, 0)
+    return [silhouette.mask(q) for q in postures]
 
 
 @pytest.mark.parametrize(("turned", "words"), [(0.0, "good"), (0.005, "usable"), (0.02, "bad")])
-def test_a_fixed_camera_that_is_turned_is_found_out_by_the_arms_outline(turned, words, capsys, watched):
+def test_a_fixed_camera_that_is_turned_is_found_out_by_the_arms_outline(turned, words, capsys, watched, drawn):
     config, kinematics, postures = watched
     # About the camera's y axis: to the right the arm is seen further left, by f tan(angle).
     X_WC = kinematics.fixed_camera @ exp_se3(np.array([0, turned, 0, 0, 0, 0]))
-    frames = [seen_from(kinematics, X_WC, q, config.camera.intrinsics) for q in postures]
-    told, drawn, name = _outlines_told(frames, Console())
+    intrinsics = config.camera.intrinsics
+    really = RobotSilhouette(PandaKinematics(PandaDescription(), X_WC), intrinsics, 0, 0)
+    color = np.full((*intrinsics.shape, 3), 90, np.uint8)
+    frames = []
+    for q, robot in zip(postures, drawn, strict=True):  # the arm is 0.3 m before a wall
+        depth = np.where(really.mask(q), 0.7, 1.0).astype(np.float32)
+        frames.append(Frame(0, 0.0, intrinsics, color, depth, kinematics.X_WC(q), robot))
+    told, pictures, name = _outlines_told(frames, Console())
     assert name == "outline"
-    assert len(drawn) == told["pictures"] == 4
+    assert len(pictures) == told["pictures"] == 4
     assert told["shift_px"][0] == pytest.approx(-config.camera.fx * np.tan(turned), abs=0.8)
     assert f"): {words}" in " ".join(capsys.readouterr().out.split())

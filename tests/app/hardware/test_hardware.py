@@ -24,6 +24,7 @@ from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pushing.time_law import SpeedLimits
 from riseg_drake.robot.kinematics import READY, PandaKinematics, observation_posture, tip_pointing_down
 from riseg_drake.robot.limits import PANDA_LIMITS
+from riseg_drake.stations.driver_reasons import reasons_message
 from riseg_drake.stations.even_clock import EvenClock
 from riseg_drake.stations.ground_truth import LABEL_CHANNEL, POSE_CHANNEL, encode_labels, encode_poses
 from riseg_drake.stations.ideal_arm import status_message
@@ -143,7 +144,10 @@ class Drivers:
     [
         (lcmt_panda_status.kUserStopped, r"robot_mode is 5 \(user stopped: release the user stop"),
         (lcmt_panda_status.kReflex, r"robot_mode is 4 \(reflex: unlock"),
-        (lcmt_panda_status.kIdle, r"robot_mode is 1 \(idle: is the driver started with --control_mode"),
+        (
+            lcmt_panda_status.kIdle,
+            r"robot_mode is 1 \(idle: start `riseg drive-arm`, or drake-franka-driver with --control_mode=",
+        ),
         (lcmt_panda_status.kGuiding, r"robot_mode is 3 \(guided by hand"),
     ],
 )
@@ -159,12 +163,31 @@ def test_an_arm_that_takes_no_commands_is_not_waited_for_in_silence(mode, words)
     assert not drivers.missing()
 
 
+def test_errors_by_name_are_told_with_the_mode_until_the_arm_takes_commands_again():
+    drivers = Drivers()
+    drivers.speak(lcmt_panda_status.kReflex)
+    drivers.show()
+    message = reasons_message(
+        "the robot takes no commands", ["joint_reflex", "power_limit_violation"], drivers.now
+    )
+    drivers.lcm.Publish(drivers.config.lcm.errors_channel, message.encode())
+    drivers.reception.listen()
+    words = "its driver says: the robot takes no commands: joint_reflex, power_limit_violation)"
+    assert words in drivers.missing()
+    drivers.speak(lcmt_panda_status.kReflex)
+    assert words in drivers.missing()
+    drivers.speak()
+    assert not drivers.missing()
+    drivers.speak(lcmt_panda_status.kUserStopped)
+    assert "its driver says" not in drivers.missing()
+
+
 def test_a_status_that_has_ended_is_told():
     drivers = Drivers()
     drivers.speak()
     drivers.now += 2
     drivers.show()
-    assert "PANDA_STATUS has ended (start drake-franka-driver again)" in drivers.missing()
+    assert "PANDA_STATUS has ended (start `riseg drive-arm` or drake-franka-driver again)" in drivers.missing()
 
 
 def test_messages_that_are_left_out_are_told_to_whoever_waits_for_others():
