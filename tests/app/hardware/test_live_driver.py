@@ -59,7 +59,7 @@ class Client:
         self.until(lambda: self.statuses >= end)
 
     def until_at(self, q):
-        """Where this machine is late the robot stops by itself: the word is said again, as often as it takes."""
+        """Where this machine is late the robot stops by itself: the word is said again, until it is there."""
 
         def there():
             if self.status.robot_mode == REFLEX and self.statuses > self.word_said + 500:
