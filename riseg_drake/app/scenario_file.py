@@ -35,6 +35,17 @@ class ScenarioError(ValueError):
     """What is wrong with a scenario, in one line for the person who wrote it."""
 
 
+_FORMER = {
+    "station.panda.pusher_url": [
+        f"package://riseg_drake_models/pusher/{name}.sdf" for name in ("pusher", "bar")
+    ],
+    "push.action.pusher.thickness": ["0.02"],
+    "push.action.pusher.width": ["0.03"],
+    "push.action.pusher.length": ["0.3"],
+}
+"""Keys that recordings made before `station.panda.tool` hold, with the values that are those of its default."""
+
+
 def read_scenario(path: Path, schema: type[Schema]) -> Schema:
     """Fill a dataclass from a YAML file; keys that are absent keep their defaults.
 
@@ -159,6 +170,7 @@ def _check_keys(node: yaml.Node, schema: Any, name: str, source: str, where: str
     known = [field.name for field in dataclasses.fields(schema)]
     if not isinstance(node, yaml.MappingNode):
         raise ScenarioError(f"{where} {name} must be a block of keys ({', '.join(known)}), not {_said(node)}")
+    node.value = [(k, v) for k, v in node.value if v.value not in _FORMER.get(f"{name}.{k.value}", ())]
     for index, (key_node, value_node) in enumerate(node.value):
         key = key_node.value
         path = key if name == "the scenario" else f"{name}.{key}"

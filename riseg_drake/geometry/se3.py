@@ -34,6 +34,12 @@ def move_points(X_AB: NDArray, p_BQ: NDArray) -> NDArray:
     return p_BQ @ R.T + X_AB[:3, 3].astype(p_BQ.dtype)
 
 
+def seen_from(X_AB: NDArray, motion_B: NDArray) -> NDArray[np.float64]:
+    """Motions [..., 4, 4] that B tells, as A sees them, in which B has the pose X_AB [4, 4]."""
+    seen: NDArray[np.float64] = X_AB @ motion_B @ inverse(X_AB)
+    return seen
+
+
 def exp_se3(V: NDArray) -> NDArray:
     """The motion [..., 4, 4] of twists V = [omega; v] [..., 6] over unit time."""
     omega, v = V[..., :3], V[..., 3:]

@@ -39,11 +39,6 @@ class Pusher:
         return self.tool.width
 
     @property
-    def length(self) -> float:
-        """From the flange to the end face, m."""
-        return self.tool.length
-
-    @property
     def overhangs(self) -> tuple[Overhang, ...]:
         """What is beside the tip further up, lowest first."""
         return self.tool.overhangs

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
-from riseg_drake.geometry.se3 import inverse
+from riseg_drake.geometry.se3 import inverse, seen_from
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.border_prior import BorderPriorParameters, border_prior
 from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe
@@ -78,7 +78,7 @@ class Bodies(Immutable):
 
     def seen_from(self, X_NK: NDArray[np.float64]) -> "Bodies":
         """The same with motions as a camera N sees them, in which the keyframe's has the pose X_NK [4, 4]."""
-        return replace(self, motions_K=X_NK @ self.motions_K @ inverse(X_NK))
+        return replace(self, motions_K=seen_from(X_NK, self.motions_K))
 
 
 def first_belief(
@@ -223,7 +223,7 @@ def rebased(then: Bodies, now: Bodies, old: Keyframe, following: Belief) -> Bodi
         k = np.bincount(then.motion[mine], old.area[mine]).argmax()
         motion[following.body == a] = len(motions)
         since = then.motions_K[k] @ inverse(now.motions_K[now.motion[mine][0]])
-        motions.append(X_NO @ since @ inverse(X_NO))
+        motions.append(seen_from(X_NO, since))
     return Bodies(following.body, motion, np.array(motions), following.next_id)
 
 

@@ -4,10 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import rays
-from riseg_drake.geometry.se3 import inverse, move_points
+from riseg_drake.geometry.se3 import inverse, move_points, seen_from
 from riseg_drake.segmentation.belief import Bodies
 from riseg_drake.segmentation.keyframe import Keyframe
-from riseg_drake.segmentation.memory import world_motion
 from riseg_drake.segmentation.propagation import UNKNOWN, pixels_of
 from riseg_drake.segmentation.segmentation import Segmentation
 
@@ -58,7 +57,7 @@ class Displacements:
                     self._begin(a, keyframe.frame.time, np.eye(4), _middle(keyframe, bodies, a))
                     self._at_keyframe[a] = np.eye(4)
                     self._fresh.add(a)
-                X_W = world_motion(_motion_of(bodies, a), keyframe.frame.X_WC)
+                X_W = seen_from(keyframe.frame.X_WC, _motion_of(bodies, a))
                 self._now[a] = X_W @ self._at_keyframe[a]
             if a not in self._lost:
                 self.tracks[a][segmentation.frame.time] = self._now[a]
@@ -80,7 +79,7 @@ class Displacements:
             self._now.setdefault(a, np.eye(4))
             return
         since = _motion_of(bodies, a) @ inverse(_motion_of(then, a))
-        X_W = world_motion(since, keyframe.frame.X_WC)
+        X_W = seen_from(keyframe.frame.X_WC, since)
         if a not in self._now:
             p_W = move_points(inverse(X_W), middle)
             # What has come off another body goes on from where that one was; else it stood as in the keyframe.

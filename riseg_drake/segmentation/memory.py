@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import rays
 from riseg_drake.geometry.rgbd import Frame, FramePair
-from riseg_drake.geometry.se3 import inverse, move_points
+from riseg_drake.geometry.se3 import inverse, move_points, seen_from
 from riseg_drake.segmentation.propagation import UNKNOWN, pixels_of
 
 _EVERY = 2
@@ -20,15 +20,10 @@ Memory = Mapping[int, NDArray[np.float64]]
 """Points p_WQ [N, 3] of each id that the frame it belongs to does not see."""
 
 
-def world_motion(motion_C0: NDArray, X_WC0: NDArray) -> NDArray[np.float64]:
-    """A motion [4, 4] given in C0, in the world."""
-    return X_WC0 @ motion_C0 @ inverse(X_WC0)
-
-
 def moved_memory(memory: Memory, motion_of: Mapping[int, NDArray], X_WC0: NDArray) -> Memory:
     """The memory with each object's points where its motion [4, 4] in C0 has taken them."""
     return {
-        a: move_points(world_motion(motion_of[a], X_WC0), p_WQ) if a in motion_of else p_WQ
+        a: move_points(seen_from(X_WC0, motion_of[a]), p_WQ) if a in motion_of else p_WQ
         for a, p_WQ in memory.items()
     }
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import rays
 from riseg_drake.geometry.rgbd import Frame, FramePair
-from riseg_drake.geometry.se3 import inverse, move_points
+from riseg_drake.geometry.se3 import inverse, move_points, seen_from
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.belief import (
     Belief,
@@ -152,7 +152,7 @@ def segment_by_evidence(
     deciding |= leaves
     if deciding:
         compared = _compared(now, belief.keyframe, look)
-        candidates_K = inverse(X_NK) @ candidates_N @ X_NK
+        candidates_K = seen_from(inverse(X_NK), candidates_N)
         candidates_K = search_motions(_problem(belief, compared, look), candidates_K)
         if len(candidates_K):
             seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters)
@@ -229,7 +229,7 @@ def _explained(
     bodies by it."""
     seen = observe(compared, belief.bond, belief.part, candidates_N, parameters.observation)
     X_KN = inverse(belief.keyframe.frame.X_WC) @ compared.keyframe.frame.X_WC
-    seen = replace(seen, motions_K=X_KN @ seen.motions_K @ inverse(X_KN))
+    seen = replace(seen, motions_K=seen_from(X_KN, seen.motions_K))
     return bodies_of(belief, seen, before, parameters.belief, parameters.observation)
 
 

@@ -3,6 +3,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
+from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.scenario_file import ScenarioError, parse_scenario, read_scenario
 
 
@@ -195,3 +196,26 @@ def test_a_pipe_in_the_place_of_a_scenario_hangs_nobody(tmp_path):
     os.mkfifo(tmp_path / "x.yaml")
     with pytest.raises(ScenarioError, match="a pipe, not a file; a scenario is a YAML file"):
         read_scenario(tmp_path / "x.yaml", Scene)
+
+
+FORMER = "station: {{panda: {{pusher_url: 'package://riseg_drake_models/pusher/{file}.sdf'}}}}"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        FORMER.format(file="pusher"),
+        FORMER.format(file="bar"),
+        "push: {action: {pusher: {thickness: 0.02, width: 0.03, length: 0.3}}}",
+    ],
+)
+def test_what_recordings_say_of_the_bar_by_its_former_keys_is_todays_default(text):
+    read, default = parse_scenario(text, Scenario, source="run.yaml"), Scenario()
+    assert read.station.panda == default.station.panda
+    assert read.push.action.pusher == default.push.action.pusher
+
+
+@pytest.mark.parametrize("text", [FORMER.format(file="mine"), "push: {action: {pusher: {width: 0.04}}}"])
+def test_another_tool_by_its_former_keys_is_refused(text):
+    with pytest.raises(ScenarioError, match="unknown key"):
+        parse_scenario(text, Scenario, source="run.yaml")

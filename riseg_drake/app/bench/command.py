@@ -56,7 +56,7 @@ def bench_command(
     with console.status("measuring time"):
         clock, pairs = StageClock(), PairTimes()
         for _ in range(REPETITIONS):
-            _segment(scenario, images, clock, pairs)
+            segment_once(scenario, images, clock, pairs)
     with console.status("measuring memory"):
         memory = _StageMemory()
         tracemalloc.start()
@@ -100,22 +100,22 @@ class _StageMemory(StageClock):
             self.peaks.setdefault(stage, []).append(peak - before)
 
 
-def segment_once(scenario: Scenario, images: Sequence[StationOutputs], clock: StageClock | None = None) -> None:
-    """Put the images through Alg. 2, as fast as it goes, and book what each stage takes."""
-    _segment(scenario, images, clock or StageClock(), None)
-
-
-def _segment(
-    scenario: Scenario, images: Sequence[StationOutputs], clock: StageClock, pairs: PairTimes | None
+def segment_once(
+    scenario: Scenario,
+    images: Sequence[StationOutputs],
+    clock: StageClock | None = None,
+    pairs: PairTimes | None = None,
 ) -> None:
-    """Put the images through Alg. 2, one tick of the camera each, and book every stage and the whole."""
+    """Put the images through Alg. 2 as fast as it goes, one tick of the camera each, and book every stage, and
+    each pair beside its flow, where there is a clock and a book for it."""
     period = 1 / scenario.station.camera.rate
     view = panda_view(scenario, PandaKinematics(scenario.station.panda, scenario.station.camera.fixed_pose))
     diagram, stages = make_segmentation(scenario, view, period, seed=0)
     groups = diagram.GetOutputPort("groups")
     after_each = put_through(diagram, images, period)
     next(after_each)  # the first frame has no partner, and fills what is computed once for all
-    clock.watch(stages)
+    if clock:
+        clock.watch(stages)
     colors = [np.array(each["color_image"].get_value().data[..., :3]) for each in images] if pairs else []
     for number in range(1, len(images)):
         start = perf_counter()

@@ -10,6 +10,8 @@ from riseg_drake.app.cli import main
 
 pytestmark = pytest.mark.renders
 
+STAGES = ("FrameView", "ObjectsAboveTable", "ExpectedFlow", "OpticalFlow", "BFIFGrouper", "MaskPropagator")
+
 
 def test_every_pair_of_a_push_is_timed_and_its_flow_beside_it(small_scenario, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(command, "REPETITIONS", 1)
@@ -19,6 +21,8 @@ def test_every_pair_of_a_push_is_timed_and_its_flow_beside_it(small_scenario, tm
     pairs, stages = written["pairs"], written["stages"]
     calls = {name: each["calls"] for name, each in pairs.items()}
     assert calls[MOVING] > 10
+    rows = {line.split()[0] for line in printed.splitlines() if line.strip()}
+    assert rows >= {*STAGES, "pair,", "DIS"}
     assert calls[FLOW] == calls[MOVING] + calls.get(STILL, 0) == stages["BFIFGrouper"]["calls"]
     assert f"{pairs[MOVING]['median_ratio']:.1f}, {pairs[MOVING]['p95_ratio']:.1f} and" in printed
     # Stages do not work twice at once: together they take no longer than whole pairs.

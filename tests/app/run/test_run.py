@@ -6,7 +6,6 @@ import cv2
 import numpy as np
 import pytest
 
-from riseg_drake.app.bench import command as bench
 from riseg_drake.app.cli import main
 from riseg_drake.app.run import command as run_module
 from riseg_drake.evaluation.in_motion import overlap_f_of
@@ -212,11 +211,3 @@ def test_the_same_seed_gives_the_same_bytes(finished, small_scenario, tmp_path):
     for name in ("color.png", "depth.png", "mask.png", "ground_truth.png"):
         again = tmp_path / "again" / "step_1" / name
         assert again.read_bytes() == (finished / "step_1" / name).read_bytes(), name
-
-
-def test_the_bench_measures_every_stage(small_scenario, capsys, monkeypatch):
-    monkeypatch.setattr(bench, "REPETITIONS", 1)
-    assert main(["bench", str(small_scenario), "--seed", "1"]) == 0
-    printed = capsys.readouterr().out
-    rows = {line.split()[0] for line in printed.splitlines() if line.strip()}
-    assert rows >= {*STAGES, "pair,", "DIS"}
