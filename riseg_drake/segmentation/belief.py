@@ -10,6 +10,8 @@ from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
 from riseg_drake.geometry.se3 import inverse, seen_from
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.border_prior import BorderPriorParameters, border_prior
+from riseg_drake.segmentation.carried_evidence import KnownBorders, Origin, carried_evidence
+from riseg_drake.segmentation.coincidence import freedoms_shown
 from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe
 from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.observation import Observation, ObservationParameters, evidence_of_parts
@@ -35,6 +37,9 @@ class BeliefParameters:
     partition: PartitionParameters = field(default_factory=PartitionParameters)
     inside: float = 2.0
     """Evidence of a border that lies inside what was one superpixel before, nats."""
+    once: bool = True
+    """What goes along with its neighbour because they touch does so at every push: that both move alike counts
+    once, as the most that a push has said for it."""
     most: float = 12.0
     """Evidence of a border adds up to no more than that, nats, so that it can be revised."""
     weaker: list[float] = field(default_factory=lambda: [0.5, 1.0, 1.5])
@@ -50,11 +55,15 @@ class Belief(Immutable):
     """[M], log-odds that both sides of a border are one body, by the still picture."""
     evidence: NDArray[np.float64]
     """[M], what motion has added."""
+    alike: NDArray[np.float64]
+    """[M], how much of it as both sides have moved alike."""
     body: NDArray[np.intp]
     """[N], ids; 0 where nothing has moved yet."""
     next_id: int
     part: NDArray[np.intp]
     """[N], 0.., which superpixels are one body by all that is known: what has not moved, too."""
+    shown: NDArray[np.float64]
+    """[M], of how many freedoms of a motion these parts on both sides of a border tell."""
     finer: NDArray[np.intp]
     """[L, N], the same if all bonds were weaker."""
 
@@ -62,6 +71,14 @@ class Belief(Immutable):
     def bond(self) -> NDArray[np.float64]:
         """[M], log-odds that both sides of a border are one body."""
         return self.prior + self.evidence
+
+    def with_evidence(self, seen: NDArray[np.float64], parameters: BeliefParameters) -> "Belief":
+        """The same with what one frame adds to the evidence of each border [M]."""
+        before = self.alike if parameters.once else np.zeros_like(self.alike)
+        alike = np.maximum(before, seen)
+        evidence = self.evidence + np.minimum(seen, 0.0) + alike - before
+        evidence = np.clip(evidence, -parameters.most, parameters.most)
+        return replace(self, evidence=evidence, alike=alike)
 
 
 @dataclass(frozen=True)
@@ -87,13 +104,16 @@ def first_belief(
     """Nothing has moved yet."""
     keyframe = make_keyframe(frame, above, noise, parameters.keyframe)
     prior = border_prior(keyframe, parameters.prior)
+    part = partition(keyframe, prior, parameters.partition)
     return Belief(
         keyframe=keyframe,
         prior=prior,
         evidence=np.zeros(len(keyframe.borders)),
+        alike=np.zeros(len(keyframe.borders)),
         body=np.zeros(keyframe.count, np.intp),
         next_id=1,
-        part=partition(keyframe, prior, parameters.partition),
+        part=part,
+        shown=freedoms_shown(keyframe.edges, frame.gray, part, keyframe.borders),
         finer=_finer(keyframe, prior, parameters),
     )
 
@@ -117,12 +137,14 @@ def bodies_of(
     motion explains falls apart for it.
     """
     keyframe = belief.keyframe
-    part = partition(keyframe, belief.bond + seen.evidence, parameters.partition, seen.nats)
+    bond = belief.with_evidence(seen.evidence, parameters).bond
+    part = partition(keyframe, bond, parameters.partition, seen.nats)
     if keyframe.across.any():
         # What lies about a gap says little of its motion; all of both pieces together may be sure of it.
-        of_parts = evidence_of_parts(seen, keyframe, part, observation)
+        of_parts = evidence_of_parts(seen, keyframe, part, belief.shown, observation)
         seen = replace(seen, evidence=np.where(keyframe.across, of_parts, seen.evidence))
-        part = partition(keyframe, belief.bond + seen.evidence, parameters.partition, seen.nats)
+        bond = belief.with_evidence(seen.evidence, parameters).bond
+        part = partition(keyframe, bond, parameters.partition, seen.nats)
     seen = replace(seen, evidence=seen.evidence + apart(keyframe, part, seen.nats, parameters.partition))
     motion = motions_of_parts(part, seen.nats, parameters.partition)
     found_before = np.bincount(part, keyframe.area * (belief.body > 0), len(motion))
@@ -188,23 +210,23 @@ def next_belief(
     new = make_keyframe(frame, above, noise, parameters.keyframe, ids)
     source = _most_seen(new, carried) - 1
     known = source >= 0
-    evidence = belief.evidence
     if seen is not None:
-        evidence = np.clip(evidence + seen.evidence, -parameters.most, parameters.most)
+        belief = belief.with_evidence(seen.evidence, parameters)
     body = np.where(known, bodies.body[source], _most_seen(new, np.where(carried == 0, ids, 0)))
     prior = border_prior(new, parameters.prior)
     origin = Origin(source, body, moved=known & (bodies.motion[source] > 0))
-    evidence = carried_evidence(
-        replace(belief, evidence=evidence, body=bodies.body), new, prior, origin, parameters
-    )
+    known_borders = KnownBorders(old, belief.prior, belief.evidence, belief.alike, bodies.body)
+    evidence, alike = carried_evidence(known_borders, new, prior, origin, parameters.inside)
     part = partition(new, prior + evidence, parameters.partition)
     return Belief(
         keyframe=new,
         prior=prior,
         evidence=evidence,
+        alike=alike,
         body=completed(body, known, part, new.area),
         next_id=bodies.next_id,
         part=part,
+        shown=freedoms_shown(new.edges, frame.gray, part, new.borders),
         finer=_finer(new, prior + evidence, parameters),
     )
 
@@ -240,68 +262,6 @@ def completed(
 def _finer(keyframe: Keyframe, bond: NDArray[np.float64], parameters: BeliefParameters) -> NDArray[np.intp]:
     parts = [partition(keyframe, bond - by, parameters.partition) for by in parameters.weaker]
     return np.array(parts, np.intp).reshape(-1, keyframe.count)
-
-
-@dataclass(frozen=True)
-class Origin:
-    """Of the N superpixels of a new keyframe, what they were in the old one."""
-
-    source: NDArray[np.intp]
-    """[N], superpixel of the old keyframe; -1 where it shows none."""
-    body: NDArray[np.intp]
-    """[N], ids."""
-    moved: NDArray[np.bool_]
-    """[N], whether it has moved since."""
-
-
-def carried_evidence(
-    old: Belief,
-    new: Keyframe,
-    new_prior: NDArray[np.float64],
-    origin: Origin,
-    parameters: BeliefParameters,
-) -> NDArray[np.float64]:
-    """Evidence [M] for the borders of the new keyframe.
-
-    What a body uncovered that moved away is not that body; of others that stood beside it, it may be.
-    """
-    a, b = new.borders.T
-    body, moved = origin.body, origin.moved
-    from_a, from_b = origin.source[a], origin.source[b]
-    count, old_borders = old.keyframe.count, old.keyframe.borders
-    code = np.minimum(from_a, from_b) * count + np.maximum(from_a, from_b)
-    old_code = old_borders[:, 0] * count + old_borders[:, 1]  # rising
-    place = np.clip(np.searchsorted(old_code, code), 0, max(len(old_code) - 1, 0))
-    known = (from_a >= 0) & (from_b >= 0)
-    if len(old_code):
-        same_border = known & (from_a != from_b) & (old_code[place] == code)
-        # A gap that was seen once is remembered when it has closed.
-        remembered = old.evidence[place] + np.minimum(old.prior[place] - new_prior, 0)
-    else:
-        same_border, remembered = np.zeros(len(a), bool), np.zeros(len(a))
-    stood = ((from_a < 0) ^ (from_b < 0)) & ~moved[a] & ~moved[b]
-    # What has parted is two, and so is what may lie on the other and goes along with it; what was told apart by
-    # less is as much two as all that was seen between them says.
-    two, between = -2 * parameters.inside, _between_bodies(old, new, body)
-    unlike = np.where((between > -parameters.inside) & ~new.over, between, two)
-    apart = np.where(
-        body[a] == body[b],
-        # A gap in what is one body is one in the picture.
-        np.where(body[a] > 0, parameters.inside / 2 - np.where(new.across, new_prior, 0.0), 0),
-        np.where(stood, 0, unlike),
-    )
-    evidence = np.where(known & (from_a == from_b), parameters.inside, np.where(same_border, remembered, apart))
-    return np.where(known | (body[a] > 0) | (body[b] > 0), evidence, 0.0)
-
-
-def _between_bodies(old: Belief, new: Keyframe, body: NDArray[np.intp]) -> NDArray[np.float64]:
-    """[M], the mean evidence of all borders that both bodies of a new border had; -inf if they had none."""
-    pairs = np.sort(np.concatenate([old.body[old.keyframe.borders], body[new.borders]]), axis=1)
-    _, pair = np.unique(pairs, axis=0, return_inverse=True)
-    before, now = np.split(pair.ravel(), [len(old.evidence)])
-    length = np.bincount(before, old.keyframe.length, len(pairs))
-    total = np.bincount(before, old.keyframe.length * old.evidence, len(pairs))
-    return np.divide(total, length, out=np.full(len(pairs), -np.inf), where=length > 0)[now]
 
 
 def _carry(

@@ -44,6 +44,8 @@ class ObservationParameters:
     """The same where one of two may lie on the other: as often as not."""
     across: float = 0.05
     """The same across a gap: what does not touch is pushed along by a third thing at most."""
+    touching: float = 1.0
+    """Freedoms of a motion that things which touch have in common anyway, as they go on touching."""
     stays: float = 0.8
     """rho(k | k) of standing still: with which the neighbour of what stands still stands still, too."""
     still_share: float = 0.5
@@ -78,6 +80,7 @@ def observe(
     compared: Comparison,
     bond: NDArray[np.float64],
     part: NDArray[np.intp],
+    shown: NDArray[np.float64],
     candidates_K: NDArray[np.float64],
     parameters: ObservationParameters,
 ) -> Observation:
@@ -87,6 +90,7 @@ def observe(
         compared: the keyframe, which is explained, and the frame.
         bond: [M], log-odds of each border so far.
         part: [N], 0.., which superpixels are one body so far.
+        shown: [M], of how many freedoms of a motion both sides of a border tell, see `coincidence`.
         candidates_K: [C, 4, 4], motions since the keyframe, seen from its camera.
         parameters: see there.
     """
@@ -114,14 +118,18 @@ def observe(
         motions_K=motions_K[needed],
         motion=motion,
         nats=nats,
-        evidence=_evidence(keyframe, q, share, parameters),
+        evidence=_evidence(keyframe, q, share, shown, parameters),
         span=np.array(spans)[motion],
         share=share,
     )
 
 
 def evidence_of_parts(
-    seen: Observation, keyframe: Keyframe, part: NDArray[np.intp], parameters: ObservationParameters
+    seen: Observation,
+    keyframe: Keyframe,
+    part: NDArray[np.intp],
+    shown: NDArray[np.float64],
+    parameters: ObservationParameters,
 ) -> NDArray[np.float64]:
     """[M], log-odds that both sides of a border are one body, by all of the parts [N] that they belong to.
 
@@ -129,15 +137,22 @@ def evidence_of_parts(
     """
     nats = np.array([np.bincount(part, n) for n in seen.nats])
     q = motion_posterior(nats, seen.share, parameters.outlier)
-    return _evidence(keyframe, q[:, part], seen.share, parameters)
+    return _evidence(keyframe, q[:, part], seen.share, shown, parameters)
 
 
 def _evidence(
-    keyframe: Keyframe, q: NDArray[np.float64], share: NDArray[np.float64], parameters: ObservationParameters
+    keyframe: Keyframe,
+    q: NDArray[np.float64],
+    share: NDArray[np.float64],
+    shown: NDArray[np.float64],
+    parameters: ObservationParameters,
 ) -> NDArray[np.float64]:
-    """[M], by how likely each motion is each superpixel's own [G, N] and how common each is [G]."""
+    """[M], by how likely each motion is each superpixel's own [G, N], how common each is [G], and of how many
+    freedoms of a motion both sides of a border tell [M]."""
     along = np.where(keyframe.over, parameters.carried, parameters.along)
     along[keyframe.across] = parameters.across
+    # What both sides do not show, or have in common as they touch, is no coincidence.
+    along **= np.clip(shown - np.where(keyframe.across, 0.0, parameters.touching), 0.0, 1.0)
     # That what does not touch stands still says nothing.
     stays = np.where(keyframe.across | keyframe.behind, 1.0, parameters.stays)
     return bond_evidence(q, share, keyframe.borders, stays, along)

@@ -227,7 +227,7 @@ def _explained(
 ) -> tuple[Observation, Bodies]:
     """What a frame says, given some motions [C, 4, 4] as the camera that it is compared with sees them, and the
     bodies by it."""
-    seen = observe(compared, belief.bond, belief.part, candidates_N, parameters.observation)
+    seen = observe(compared, belief.bond, belief.part, belief.shown, candidates_N, parameters.observation)
     X_KN = inverse(belief.keyframe.frame.X_WC) @ compared.keyframe.frame.X_WC
     seen = replace(seen, motions_K=seen_from(X_KN, seen.motions_K))
     return bodies_of(belief, seen, before, parameters.belief, parameters.observation)
@@ -271,7 +271,8 @@ def _carried(
     )
     margin = now.margin
     if deciding and seen is not None:
-        margin = margins(belief.keyframe, belief.bond + seen.evidence, bodies.body, parameters.belief.partition)
+        bond = belief.with_evidence(seen.evidence, parameters.belief).bond
+        margin = margins(belief.keyframe, bond, bodies.body, parameters.belief.partition)
     # What was decided in motion is looked at once more when it rests.
     decided = now.decided or (deciding and now.still_since is not None)
     moved = deciding and len(bodies.motions_K) > 1

@@ -11,10 +11,8 @@ from riseg_drake.segmentation.belief import (
     Belief,
     BeliefParameters,
     Bodies,
-    Origin,
     _most_seen,
     bodies_of,
-    carried_evidence,
     completed,
     next_belief,
     rebased,
@@ -47,91 +45,12 @@ def test_how_bodies_had_moved_when_the_reference_was_taken_is_told_since_the_new
         np.testing.assert_allclose(X, np.eye(4), atol=1e-12)
 
 
-def carried(
-    old_borders, old_evidence, old_body, new_borders, origin, prior=2.0, across=None, length=None, over=False
-):
-    """Evidence for new borders; 4 nats would be against what never met, 1 for what was one body."""
-    keyframe = SimpleNamespace(
-        borders=np.array(old_borders),
-        count=len(old_body),
-        length=np.ones(len(old_borders)) if length is None else np.array(length),
-    )
-    evidence = np.array(old_evidence, float)
-    was = np.full(len(evidence), 2.0)
-    old = SimpleNamespace(keyframe=keyframe, prior=was, evidence=evidence, body=old_body)
-    across = np.zeros(len(new_borders), bool) if across is None else np.array(across)
-    new = SimpleNamespace(borders=np.array(new_borders), across=across, over=np.full(len(across), over))
-    return carried_evidence(old, new, np.full(len(new_borders), prior), origin, BeliefParameters(inside=2.0))
-
-
-def test_what_a_body_uncovers_is_not_that_body_and_may_be_one_that_stood_beside_it():
-    # 0 moved, 1 stood, 2 has never moved, 3 and 4 are uncovered.
-    borders = [[0, 1], [0, 3], [1, 3], [2, 3], [3, 4]]
-    body = np.array([5, 6, 0, 0, 0])
-    origin = Origin(source=np.array([0, 1, 2, -1, -1]), body=body, moved=np.arange(5) == 0)
-    evidence = carried([[0, 1]], [-7.0], body[:3], borders, origin)
-    assert evidence == pytest.approx([-7.0, -4.0, 0.0, 0.0, 0.0])
-
-
-def test_of_two_bodies_all_that_was_seen_between_them_is_remembered_wherever_they_meet_now():
-    # 0 and 1 were the body 5, 2 and 3 the body 6; what meets now are the ends that did not touch, 0 and 3.
-    body = np.array([5, 5, 6, 6])
-    origin = Origin(source=np.arange(4), body=body, moved=np.ones(4, bool))
-    met = [[0, 1], [0, 2], [1, 2], [2, 3]]
-    evidence = carried(met, [1.0, -1.0, 0.5, 1.0], body, [[0, 3]], origin, length=[1.0, 1.0, 3.0, 1.0])
-    assert evidence == pytest.approx([(1 * -1.0 + 3 * 0.5) / 4])
-    # What has parted is two, and so is what may lie on the other.
-    parted = carried(met, [1.0, -3.0, -1.8, 1.0], body, [[0, 3]], origin, length=[1.0, 1.0, 3.0, 1.0])
-    assert parted == pytest.approx([-4.0])
-    assert carried(met, [1.0, -1.0, 0.5, 1.0], body, [[0, 3]], origin, over=True) == pytest.approx([-4.0])
-    # Bodies that were never near each other are two.
-    never = carried([[0, 1], [2, 3]], [1.0, 1.0], body, [[0, 3], [1, 2]], origin, across=[False, True])
-    assert never == pytest.approx([-4.0, -4.0])
-
-
-def test_a_gap_that_opens_in_the_picture_of_one_body_does_not_speak_against_it():
-    body = np.array([5, 5, 5])
-    origin = Origin(source=np.array([0, -1, -1]), body=body, moved=np.ones(3, bool))
-    evidence = carried([[0, 1], [1, 2]], [1.0, 1.0], body, [[0, 1], [0, 2]], origin, -1.5, [True, False])
-    assert evidence + -1.5 == pytest.approx([1.0, -0.5])
-
-
 def test_what_is_uncovered_takes_the_id_of_most_of_its_part_and_what_was_known_keeps_its_own():
     part = np.array([0, 0, 0, 1, 1, 2, 2])
     body = np.array([4, 0, 0, 5, 0, 6, 0])
     known = np.array([True, True, False, True, False, True, False])
     area = np.array([30, 10, 10, 10, 11, 11, 10])
     np.testing.assert_array_equal(completed(body, known, part, area), [4, 0, 4, 5, 0, 6, 6])
-
-
-def test_a_border_is_remembered_by_both_its_sides_whichever_way_round_and_whatever_its_number():
-    # Five superpixels in a new order: 4 was 0, 3 was 1, and so on; each old border has evidence of its own.
-    old_borders = [[0, 1], [0, 2], [1, 3], [2, 3], [2, 4], [3, 4]]
-    evidence = np.array([1.0, -2.0, 3.0, -4.0, 5.0, -6.0])
-    origin = Origin(source=np.arange(5)[::-1], body=np.zeros(5, int), moved=np.zeros(5, bool))
-    new_borders = sorted(sorted(4 - side for side in border) for border in old_borders)
-    told = carried(old_borders, evidence, np.zeros(5, int), new_borders, origin)
-    expected = [evidence[old_borders.index(sorted(4 - side for side in border))] for border in new_borders]
-    assert told == pytest.approx(expected)
-
-
-def test_what_was_one_superpixel_is_one_and_what_was_not_a_border_is_by_its_bodies():
-    # 0 and 1 were one; 1 and 2 never touched, and are bodies 5 and 6; 2 and 3 never touched and are body 6.
-    origin = Origin(np.array([0, 0, 1, 2]), np.array([5, 5, 6, 6]), np.ones(4, bool))
-    told = carried([[0, 3]], [9.0], np.array([5, 6, 6, 0]), [[0, 1], [1, 2], [2, 3]], origin)
-    assert told == pytest.approx([2.0, -4.0, 1.0])
-
-
-def test_a_gap_that_was_seen_once_is_remembered_when_it_has_closed():
-    origin = Origin(np.array([0, 1]), np.zeros(2, int), np.zeros(2, bool))
-    for prior, remembered in ((2.0, 3.0), (2.5, 2.5), (1.0, 3.0)):  # it was 2 in the old picture
-        told = carried([[0, 1]], [3.0], np.zeros(2, int), [[0, 1]], origin, prior=prior)
-        assert told == pytest.approx([remembered])
-
-
-def test_what_was_known_of_no_body_says_nothing_of_what_comes_into_sight():
-    origin = Origin(np.array([0, -1, -1]), np.zeros(3, int), np.zeros(3, bool))
-    assert carried([[0, 1]], [3.0], np.zeros(2, int), [[1, 2]], origin) == pytest.approx([0.0])
 
 
 def test_the_value_that_a_superpixel_shows_most_is_told():
@@ -157,8 +76,16 @@ def a_row_of_four(body, next_id=3, across=(False, False, False), area=(100, 100,
         across=np.array(across),
         pixels_per_metre=1.0,
     )
-    belief = SimpleNamespace(
-        keyframe=keyframe, bond=np.array([2.0, -1, 2]), body=np.array(body), next_id=next_id
+    belief = Belief(
+        keyframe=keyframe,
+        prior=np.array([2.0, -1, 2]),
+        evidence=np.zeros(3),
+        alike=np.zeros(3),
+        body=np.array(body),
+        next_id=next_id,
+        part=np.arange(4),
+        shown=np.full(3, 3.0),
+        finer=np.zeros((0, 4), int),
     )
     nats = np.array([[50.0, 50, 0, 0], [0, 0, 50, 50]])
     said = np.array([0.1, -0.2, 0.3])
@@ -204,21 +131,30 @@ def test_across_a_gap_all_of_both_parts_says_what_they_are_and_elsewhere_each_su
     np.testing.assert_allclose(seen.evidence, [0.1, -3.0 - 2.0, 0.3])
 
 
-@pytest.mark.parametrize("watched", [True, False])
+@pytest.mark.parametrize(
+    ("watched", "once", "evidence", "alike"),
+    [
+        # It adds up to no more than 12 nats either way, and what moved alike before and now counts once.
+        (True, True, [12.0, -12.0, 1.0], [2.0, 1.0, 0.75]),
+        (True, False, [12.0, -12.0, 1.25], [2.0, 0.0, 0.25]),
+        (False, True, [11.5, -11.5, 1.0], [0.5, 1.0, 0.75]),
+    ],
+)
 def test_a_new_keyframe_knows_its_superpixels_by_what_the_old_ones_carry_and_what_is_remembered(
-    monkeypatch, watched
+    monkeypatch, watched, once, evidence, alike
 ):
     """Four superpixels: the old 0, body 5, which moved, 1, which stood, 7 of memory, and nothing; 2 is gone."""
     of_the_old = np.tile(np.array([1, 2, 0, UNKNOWN], np.uint16), (2, 1))
     remembered = np.tile(np.array([0, 9, 7, UNKNOWN], np.uint16), (2, 1))
-    evidence = np.array([11.5, -11.5, 1.0])
     old = Belief(
         SimpleNamespace(count=3),
         np.zeros(3),
-        evidence,
+        np.array([11.5, -11.5, 1.0]),
+        np.array([0.5, 1.0, 0.75]),
         np.array([0, 1, 0]),
         6,
         np.arange(3),
+        np.full(3, 3.0),
         np.arange(3)[None],
     )
     bodies = Bodies(np.array([5, 0, 6]), np.array([1, 0, 1]), STILL_AND_MOVED, 8)
@@ -227,7 +163,10 @@ def test_a_new_keyframe_knows_its_superpixels_by_what_the_old_ones_carry_and_wha
         region=(slice(0, 2), slice(0, 4)),
         count=4,
         area=np.array([2, 2, 3, 2]),
+        edges="edges",
+        borders="borders",
     )
+    frame = SimpleNamespace(gray="gray")
     given = {}
 
     def carry(belief, label, moves, *_):
@@ -238,17 +177,18 @@ def test_a_new_keyframe_knows_its_superpixels_by_what_the_old_ones_carry_and_wha
         given["ids"] = ids
         return new
 
-    def evidence_for(belief, keyframe, prior, origin, parameters):
-        given.update(old=belief, origin=origin)
-        return np.array([0.5])
+    def evidence_for(old, keyframe, prior, origin, inside):
+        given.update(old=old, origin=origin)
+        return np.array([0.5]), np.array([0.25])
 
     monkeypatch.setattr(module, "_carry", carry)
     monkeypatch.setattr(module, "make_keyframe", keyframe)
     monkeypatch.setattr(module, "border_prior", lambda *_: np.array([1.0]))
     monkeypatch.setattr(module, "carried_evidence", evidence_for)
     monkeypatch.setattr(module, "partition", lambda keyframe, bond, parameters: np.array([0, 1, 2, 2]))
-    seen = SimpleNamespace(evidence=np.array([2.0, -2.0, 0.25])) if watched else None
-    belief = next_belief(old, seen, bodies, None, None, remembered, None, BeliefParameters())
+    monkeypatch.setattr(module, "freedoms_shown", lambda *given: given)
+    seen = Observation(*[None] * 3, np.array([2.0, -2.0, 0.25]), *[None] * 2) if watched else None
+    belief = next_belief(old, seen, bodies, frame, None, remembered, None, BeliefParameters(once=once))
     assert given["label"] == [1, 2, 3]
     assert list(given["moves"]) == [1, 3]
     np.testing.assert_array_equal(given["moves"][1], STILL_AND_MOVED[1])
@@ -257,11 +197,14 @@ def test_a_new_keyframe_knows_its_superpixels_by_what_the_old_ones_carry_and_wha
     assert origin.source.tolist() == [0, 1, -1, -1]
     assert origin.body.tolist() == [5, 0, 7, 0]
     assert origin.moved.tolist() == [True, False, False, False]
-    # What was seen adds up to no more than 12 nats either way.
-    np.testing.assert_array_equal(given["old"].evidence, [12.0, -12.0, 1.25] if watched else evidence)
+    np.testing.assert_array_equal(given["old"].evidence, evidence)
+    np.testing.assert_array_equal(given["old"].alike, alike)
     np.testing.assert_array_equal(given["old"].body, [5, 0, 6])
     assert belief.keyframe is new
     assert (belief.prior.tolist(), belief.evidence.tolist(), belief.next_id) == ([1.0], [0.5], 8)
+    assert belief.alike.tolist() == [0.25]
+    edges, gray, part, borders = belief.shown
+    assert (edges, gray, part.tolist(), borders) == ("edges", "gray", [0, 1, 2, 2], "borders")
     # What nothing is known of is of the part that it is in.
     assert belief.body.tolist() == [5, 0, 7, 7]
     assert belief.finer.shape == (3, 4)

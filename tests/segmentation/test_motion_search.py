@@ -186,8 +186,9 @@ def test_the_one_motion_of_a_part_falls_short_of_the_best_of_each_superpixel():
 def test_boxes_get_their_motions_and_borders_inside_them_hold():
     moved = Moved(FAR)
     keyframe = moved.belief.keyframe
+    belief = moved.belief
     seen = observe(
-        moved.compared, moved.belief.bond, moved.belief.part, moved.search(), ObservationParameters()
+        moved.compared, belief.bond, belief.part, belief.shown, moved.search(), ObservationParameters()
     )
     truth = np.array(
         [

@@ -49,8 +49,10 @@ def test_what_may_lie_on_its_neighbour_tells_less_by_going_with_it_and_as_much_b
 CERTAIN = ObservationParameters(outlier=0.0)
 
 
-def parts_beside_each_other(nats, *, across=False, behind=False, over=False, given=CERTAIN):
-    """Two parts, 0 and 1, of four superpixels in a row, with costs [G, 4]: what they say of each border."""
+def parts_beside_each_other(nats, *, across=False, behind=False, over=False, shown=3.0, given=CERTAIN):
+    """Two parts, 0 and 1, of four superpixels in a row, with costs [G, 4]: what they say of each border.
+
+    Both show so many freedoms of a motion."""
     keyframe = SimpleNamespace(
         borders=np.array([[0, 1], [1, 2], [2, 3]]),
         across=np.full(3, across),
@@ -58,7 +60,7 @@ def parts_beside_each_other(nats, *, across=False, behind=False, over=False, giv
         over=np.full(3, over),
     )
     seen = SimpleNamespace(nats=np.array(nats), share=SHARE)
-    return evidence_of_parts(seen, keyframe, np.array([0, 0, 1, 1]), given)
+    return evidence_of_parts(seen, keyframe, np.array([0, 0, 1, 1]), np.full(3, shown), given)
 
 
 @pytest.mark.parametrize(("kind", "probability"), [({}, 0.3), ({"over": True}, 0.6), ({"across": True}, 0.01)])
@@ -67,6 +69,21 @@ def test_two_parts_that_surely_moved_as_one_are_so_by_what_else_would_have_moved
     given = ObservationParameters(outlier=0.0, along=0.3, carried=0.6, across=0.01)
     evidence = parts_beside_each_other(moved, **kind, given=given)
     assert evidence[1] == pytest.approx(np.log(1 / probability))
+
+
+@pytest.mark.parametrize(
+    ("shown", "touching", "apart"), [(3, 1, 1), (2, 1, 1), (1.5, 0.5, 1), (1, 0, 1), (0, 0, 0)]
+)
+def test_what_both_sides_hardly_show_is_no_coincidence_and_less_of_one_where_they_touch(shown, touching, apart):
+    moved = np.array([[40.0] * 4, [0.0] * 4])
+    given = ObservationParameters(outlier=0.0, along=0.3, across=0.01)
+    told = parts_beside_each_other(moved, shown=shown, given=given)[1]
+    assert told == pytest.approx(touching * np.log(1 / 0.3))
+    told = parts_beside_each_other(moved, shown=shown, across=True, given=given)[1]
+    assert told == pytest.approx(apart * np.log(1 / 0.01))
+    # That they moved apart is as sure as ever.
+    unlike = np.array([[40.0, 40.0, 0.0, 0.0], [0.0, 0.0, 40.0, 40.0]])
+    assert parts_beside_each_other(unlike, shown=shown, given=given)[1] < -20
 
 
 @pytest.mark.parametrize("apart", ["across", "behind"])
@@ -150,7 +167,7 @@ def test_a_pixel_and_a_half_are_a_motion_unless_the_view_is_another_one(aside: f
     belief = first_belief(pair.reference, above, MeasurementNoise(), BeliefParameters())
     moved = motion_seen_from(cameras[0], places[0], there[0])
     compared = Comparison(belief.keyframe, pair.current, depth_noise=0.0023, view_error=0.01)
-    seen = observe(compared, belief.bond, belief.part, moved, ObservationParameters())
+    seen = observe(compared, belief.bond, belief.part, belief.shown, moved, ObservationParameters())
     assert (len(seen.motions_K) == 2) is is_one
 
 

@@ -1,0 +1,94 @@
+"""What is known of borders, carried to a new keyframe, whose superpixels and borders are others."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.rgbd import Immutable
+from riseg_drake.segmentation.keyframe import Keyframe
+
+
+@dataclass(frozen=True)
+class KnownBorders(Immutable):
+    """Of the N superpixels and M borders of an old keyframe."""
+
+    keyframe: Keyframe
+    prior: NDArray[np.float64]
+    """[M], log-odds that both sides of a border are one body, by the still picture."""
+    evidence: NDArray[np.float64]
+    """[M], what motion has added."""
+    alike: NDArray[np.float64]
+    """[M], how much of it as both sides have moved alike."""
+    body: NDArray[np.intp]
+    """[N], ids; 0 where nothing has moved yet."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Of the N superpixels of a new keyframe, what they were in the old one."""
+
+    source: NDArray[np.intp]
+    """[N], superpixel of the old keyframe; -1 where it shows none."""
+    body: NDArray[np.intp]
+    """[N], ids."""
+    moved: NDArray[np.bool_]
+    """[N], whether it has moved since."""
+
+
+def carried_evidence(
+    old: KnownBorders, new: Keyframe, new_prior: NDArray[np.float64], origin: Origin, inside: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Evidence [M] for the borders of the new keyframe, and how much of it as both sides have moved alike [M].
+
+    What a body uncovered that moved away is not that body; of others that stood beside it, it may be. Of what
+    was one superpixel before, both sides are one body by `inside` nats.
+    """
+    a, b = new.borders.T
+    body, moved = origin.body, origin.moved
+    from_a, from_b = origin.source[a], origin.source[b]
+    known = (from_a >= 0) & (from_b >= 0)
+    same_border, place = _same_borders(old.keyframe, from_a, from_b)
+    remembered = alike = np.zeros(len(a))
+    if len(old.evidence):
+        # A gap that was seen once is remembered when it has closed.
+        remembered = old.evidence[place] + np.minimum(old.prior[place] - new_prior, 0)
+        alike = old.alike[place]
+    stood = ((from_a < 0) ^ (from_b < 0)) & ~moved[a] & ~moved[b]
+    # What has parted is two, and so is what may lie on the other and goes along with it; what was told apart by
+    # less is as much two as all that was seen between them says.
+    two, between = -2 * inside, _between_bodies(old, new, body)
+    unlike = np.where((between > -inside) & ~new.over, between, two)
+    apart = np.where(
+        body[a] == body[b],
+        # A gap in what is one body is one in the picture.
+        np.where(body[a] > 0, inside / 2 - np.where(new.across, new_prior, 0.0), 0),
+        np.where(stood, 0, unlike),
+    )
+    evidence = np.where(known & (from_a == from_b), inside, np.where(same_border, remembered, apart))
+    evidence = np.where(known | (body[a] > 0) | (body[b] > 0), evidence, 0.0)
+    between = np.maximum(_between_bodies(replace(old, evidence=old.alike), new, body), 0.0)
+    return evidence, np.where(same_border, alike, np.where(body[a] != body[b], between, 0.0))
+
+
+def _same_borders(
+    old: Keyframe, from_a: NDArray[np.intp], from_b: NDArray[np.intp]
+) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
+    """Which borders between what was `from_a` and `from_b` [M], -1 for nothing, the old keyframe had, and where
+    among its own [M]."""
+    code = np.minimum(from_a, from_b) * old.count + np.maximum(from_a, from_b)
+    old_code = old.borders[:, 0] * old.count + old.borders[:, 1]  # rising
+    place = np.clip(np.searchsorted(old_code, code), 0, max(len(old_code) - 1, 0))
+    if not len(old_code):
+        return np.zeros(len(code), bool), place
+    return (from_a >= 0) & (from_b >= 0) & (from_a != from_b) & (old_code[place] == code), place
+
+
+def _between_bodies(old: KnownBorders, new: Keyframe, body: NDArray[np.intp]) -> NDArray[np.float64]:
+    """[M], the mean evidence of all borders that both bodies of a new border had; -inf if they had none."""
+    pairs = np.sort(np.concatenate([old.body[old.keyframe.borders], body[new.borders]]), axis=1)
+    _, pair = np.unique(pairs, axis=0, return_inverse=True)
+    before, now = np.split(pair.ravel(), [len(old.evidence)])
+    length = np.bincount(before, old.keyframe.length, len(pairs))
+    total = np.bincount(before, old.keyframe.length * old.evidence, len(pairs))
+    return np.divide(total, length, out=np.full(len(pairs), -np.inf), where=length > 0)[now]
