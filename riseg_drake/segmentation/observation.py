@@ -8,6 +8,8 @@ still mostly stands beside what does so, too. All other motions are as likely as
     evidence(a, b) = log( sum_k q_a(k) q_b(k) / pi_k ) - log( sum_k,l q_a(k) rho(l | k) q_b(l) / pi_l )
 
 Standing still together says little, moving together more, moving apart most; who says nothing says nothing.
+That two which touch have moved together is only as much of a coincidence as both show of a motion
+(`coincidence`): rho(k | k) is raised to that power.
 """
 
 from dataclasses import dataclass, field
