@@ -112,8 +112,8 @@ class _PathSearch:
 
     def __init__(self, plan_path: PlanPath | None, most: int):
         self._plan_path, self._most = plan_path, most
-        self._places: list[NDArray] = []  # p_WE and direction of the pushes that have no path
-        self._directions: list[NDArray] = []
+        self._places: list[NDArray] = []  # p_WE and the tool's own direction of the pushes that have no path
+        self._ahead: list[NDArray] = []
         self.failed: Counter[Criterion | PathStage] = Counter()
         """How many pushes failed at each stage."""
 
@@ -131,15 +131,20 @@ class _PathSearch:
                 return replace(push, path=path)
             self.failed[path] += 1
             self._places.append(push.p_WE[:2])
-            self._directions.append(push.direction_W)
+            self._ahead.append(_tool_ahead_W(push))
         return None
 
     def _is_like_one_that_failed(self, push: Push) -> bool:
         if not self._places:
             return False
         near = np.linalg.norm(np.array(self._places) - push.p_WE[:2], axis=1) < ALIKE_DISTANCE
-        alike = np.array(self._directions) @ push.direction_W > np.cos(ALIKE_ANGLE)
+        alike = np.array(self._ahead) @ _tool_ahead_W(push) > np.cos(ALIKE_ANGLE)
         return bool(np.any(near & alike))
+
+
+def _tool_ahead_W(push: Push) -> NDArray[np.float64]:
+    """E's x axis [2]."""
+    return np.array([np.cos(push.yaw), np.sin(push.yaw)])
 
 
 def valid_pushes(
@@ -152,7 +157,8 @@ def valid_pushes(
 ) -> tuple[list[Push], dict[Criterion, NDArray[np.bool_]]]:
     """The valid pushes of all clusters, best first (lines 7 to 10), and which candidates [N] fail what.
 
-    Not `alone`, a cluster is pushed with all that it touches.
+    Those with the back of the tool come last, for where the arm can do no other. Not `alone`, a cluster is
+    pushed with all that it touches.
     """
     table = known.table
     pushes: list[Push] = []
@@ -168,7 +174,7 @@ def valid_pushes(
         pushes += valid
         for criterion, which in fails.items():
             failed[criterion].append(which)
-    pushes.sort(key=lambda push: push.cost)
+    pushes.sort(key=lambda push: (push.turned, push.cost))
     none = [np.zeros(0, bool)]
     return pushes, {criterion: np.concatenate(which or none) for criterion, which in failed.items()}
 
@@ -207,15 +213,17 @@ def valid_pushes_of(
     )
     is_valid = is_valid_push(contacts.b_W, direction_W, center_W, P, table, pusher, validity)
     gain = expected_gain(contacts, direction_W, is_valid.overlap, P, tries, known, validity, parameters.gain)
+    room = [
+        room_below_the_tool(contacts.b_W, direction_W, contacts.tip_height, pushed, table, each, validity)
+        for each in (pusher, pusher.turned())
+    ]
     passed = {
         Criterion.CENTER_ON_OBJECT: is_valid.center_on_object,
         Criterion.ACCESSIBLE: is_valid.accessible,
         Criterion.MOVES_ALONE: is_valid.moves_alone | (not alone),
         Criterion.HIGH_ENOUGH: contacts.high_enough,
         Criterion.ONLY_TARGET: contacts.only_target & (contacts.transmitted > 0),
-        Criterion.ROOM_BELOW_THE_TOOL: room_below_the_tool(
-            contacts.b_W, direction_W, contacts.tip_height, pushed, table, pusher, validity
-        ),
+        Criterion.ROOM_BELOW_THE_TOOL: room[False] | room[True],
         Criterion.STAYS_IN_WORK_AREA: stays_in_work_area(direction_W, P, table, validity.d_push),
         Criterion.STAYS_ON_TOP: overhang(direction_W, P, table, validity.d_push) <= validity.l_act,
         Criterion.NOT_IN_VAIN: gain > least,
@@ -228,20 +236,19 @@ def valid_pushes_of(
         b_W, ahead_W, tip = contacts.b_W[n], direction_W[n], float(contacts.tip_height[n])
         start_W = b_W - (validity.clearance + pusher.thickness / 2) * ahead_W
         ground = float(table.ground(b_W + np.outer([-1, 1], length * ahead_W)).max())
-        pushes.append(
-            Push(
-                p_WE=np.append(start_W, ground + tip),
-                tip_height=tip,
-                direction_W=ahead_W,
-                p_WB=np.append(b_W, ground + max(tip, contacts.height[n] / 2)),
-                length=length,
-                d_push=validity.d_push,
-                center_W=center_W,
-                cluster_W=cluster_W,
-                tallest=tallest,
-                cost=float(1.0 - gain[n]),
-            )
+        push = Push(
+            p_WE=np.append(start_W, ground + tip),
+            tip_height=tip,
+            direction_W=ahead_W,
+            p_WB=np.append(b_W, ground + max(tip, contacts.height[n] / 2)),
+            length=length,
+            d_push=validity.d_push,
+            center_W=center_W,
+            cluster_W=cluster_W,
+            tallest=tallest,
+            cost=float(1.0 - gain[n]),
         )
+        pushes += [replace(push, turned=turned) for turned in (False, True) if room[turned][n]]
     return pushes, {criterion: ~passes for criterion, passes in passed.items()}
 
 

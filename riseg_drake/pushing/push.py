@@ -34,8 +34,17 @@ class Push(Immutable):
     """Height of the tallest object, m, above what `tip_height` is told from: the pusher crosses above it."""
     cost: float
     """What is lost of one object: less the more objects the push can be expected to settle."""
+    turned: bool = False
+    """Whether the tool pushes with its back, turned by half a turn: the arm gets to other places so, and a
+    camera on the wrist looks at the target from the other side, past the tool."""
     path: PushPath | None = field(default=None, repr=False)
     """The arm's way there and back; None until it has been planned."""
+
+    @property
+    def yaw(self) -> float:
+        """Of the tool, the direction of E's x axis about W's z, rad."""
+        sign = -1.0 if self.turned else 1.0
+        return float(np.arctan2(sign * self.direction_W[1], sign * self.direction_W[0]))
 
 
 NO_PUSH = Push(

@@ -7,6 +7,7 @@ through space that was found free.
 """
 
 from dataclasses import dataclass, field, replace
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +74,8 @@ class PushPathParameters:
     """... and the angle between them, rad."""
     joint_step: float = 0.25
     """No joint may turn more than this between two of those poses, rad: beyond, it would be a leap."""
+    postures: int = 4
+    """Ways to hold the arm behind the object, unlike each other, from which the rest is tried."""
     min_clearance: float = MIN_CLEARANCE
     """Room that arm, tool and camera keep to the table and to each other, m; half the tip's height where that
     is less, so that low things can be pushed."""
@@ -93,30 +96,41 @@ def plan_push_path(
     if push.tallest > kinematics.tool.length - parameters.arm_room:
         return PathStage.ROOM_BELOW_THE_FLANGE
     ahead_W = np.append(push.direction_W, 0.0)
-    yaw = float(np.arctan2(push.direction_W[1], push.direction_W[0]))
     ground = push.p_WE[2] - push.tip_height
     crossing = max(ground + push.tallest + parameters.crossing_height, push.p_WE[2])
-    X_WStart = tip_pointing_down(push.p_WE, yaw)
-    X_WAbove = tip_pointing_down(np.append(push.p_WE[:2], crossing), yaw)
-    X_WReached = tip_pointing_down(push.p_WE + push.length * ahead_W, yaw)
-    # From the push outwards: the posture for it is chosen first, the rest has to lead there.
+    X_WStart = tip_pointing_down(push.p_WE, push.yaw)
+    X_WAbove = tip_pointing_down(np.append(push.p_WE[:2], crossing), push.yaw)
+    X_WReached = tip_pointing_down(push.p_WE + push.length * ahead_W, push.yaw)
     low = replace(parameters, min_clearance=min(parameters.min_clearance, push.tip_height / 2))
-    q_start = kinematics.solve_ik(X_WStart, q_observe, min_clearance=low.min_clearance)
-    if q_start is None:
-        return PathStage.POSTURE
-    stroke = _trace(_between(X_WStart, X_WReached, 0.0, low), q_start, kinematics, low)
-    if stroke is None:
-        return PathStage.STROKE
-    climb = _trace(_between(X_WStart, X_WAbove, 0.0, low), q_start, kinematics, low)
-    if climb is None:
-        return PathStage.DESCENT
-    legs = _crossing(q_observe, climb[-1], crossing, kinematics, parameters)
-    if legs is None:
-        return PathStage.CROSSING
-    limits = parameters.limits.limits()
-    path = _in_time([*legs, climb[::-1], stroke], push.length, limits, kinematics.limits, parameters)
-    longest = LONGEST * max(limits.slowness, 1.0) if parameters.longest is None else parameters.longest
-    return path if path.duration <= longest else PathStage.DURATION
+    stroke_poses, climb_poses = (_between(X_WStart, X_W, 0.0, low) for X_W in (X_WReached, X_WAbove))
+
+    def from_posture(q_start: NDArray) -> PushPath | PathStage:
+        # From the push outwards: the posture for it is chosen first, the rest has to lead there.
+        stroke = _trace(stroke_poses, q_start, kinematics, low)
+        if stroke is None:
+            return PathStage.STROKE
+        climb = _trace(climb_poses, q_start, kinematics, low)
+        if climb is None:
+            return PathStage.DESCENT
+        legs = _crossing(q_observe, climb[-1], crossing, kinematics, parameters)
+        if legs is None:
+            return PathStage.CROSSING
+        return in_time([*legs, climb[::-1], stroke])
+
+    def in_time(legs: list[NDArray]) -> PushPath | PathStage:
+        limits = parameters.limits.limits()
+        path = _in_time(legs, push.length, limits, kinematics.limits, parameters)
+        longest = LONGEST * max(limits.slowness, 1.0) if parameters.longest is None else parameters.longest
+        return path if path.duration <= longest else PathStage.DURATION
+
+    failed = PathStage.POSTURE
+    postures = kinematics.free_postures(X_WStart, q_observe, min_clearance=low.min_clearance)
+    for q_start in islice(postures, parameters.postures):
+        path = from_posture(q_start)
+        if isinstance(path, PushPath):
+            return path
+        failed = path if failed is PathStage.POSTURE else failed
+    return failed
 
 
 def _crossing(

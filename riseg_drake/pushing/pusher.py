@@ -1,6 +1,6 @@
 """The end effector as a push needs to know it: a vertical tip, rectangular from below."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from riseg_drake.robot.tool_shape import Overhang, ToolShape
 
@@ -27,6 +27,10 @@ class Pusher:
 
     tool: ToolShape
     parameters: PusherParameters = field(default_factory=PusherParameters)
+
+    def turned(self) -> "Pusher":
+        """The same tool, pushing with its back."""
+        return replace(self, tool=self.tool.turned())
 
     @property
     def thickness(self) -> float:

@@ -1,6 +1,6 @@
 """Where the arm is, how it gets to a pose, and what it is about to touch."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -167,13 +167,26 @@ class PandaKinematics:
         Of all such postures the one nearest to q_near [7] (`ready` if None) is taken (largest joint
         difference), with some liking for room to the joints' limits.
         """
+        return next(self.free_postures(X_WE, q_near, margin, min_clearance), None)
+
+    def free_postures(
+        self,
+        X_WE: NDArray,
+        q_near: NDArray | None = None,
+        margin: float = LIMIT_MARGIN,
+        min_clearance: float = MIN_CLEARANCE,
+        apart: float = 0.3,
+    ) -> Iterator[NDArray[np.float64]]:
+        """What `solve_ik` takes, and then, if asked again, the next best of which some joint is `apart`, rad,
+        from where it is in each before."""
         q_near = self.ready if q_near is None else q_near
         q = self.postures(X_WE, margin)
-        order = np.argsort(np.abs(q - q_near).max(axis=1) - 0.2 * self.limits.room(q).min(axis=1))
-        for candidate in q[order]:
+        q = q[np.argsort(np.abs(q - q_near).max(axis=1) - 0.2 * self.limits.room(q).min(axis=1))]
+        while len(q):
+            candidate, q = q[0], q[1:]
             if self.clearance(candidate) >= min_clearance:
-                return candidate
-        return None
+                yield candidate
+                q = q[np.abs(q - candidate).max(axis=1) >= apart]
 
     def trace_ik(
         self,

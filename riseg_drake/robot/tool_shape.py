@@ -6,7 +6,7 @@ must be low enough to stand below.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,10 @@ class Overhang:
             and self.y[1] >= other.y[1] - 1e-6
         )
 
+    def turned(self) -> "Overhang":
+        """The same of a tool that pushes with its back."""
+        return Overhang(self.bottom, (-self.x[1], -self.x[0]), (-self.y[1], -self.y[0]))
+
 
 @dataclass(frozen=True)
 class ToolShape:
@@ -59,6 +63,10 @@ class ToolShape:
     length: float
     """From the flange (panda_link8) to the end face, m."""
     overhangs: tuple[Overhang, ...] = ()
+
+    def turned(self) -> "ToolShape":
+        """The same tool, pushing with its back."""
+        return replace(self, overhangs=tuple(overhang.turned() for overhang in self.overhangs))
 
 
 def tool_shape(

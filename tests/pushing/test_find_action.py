@@ -3,15 +3,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from riseg_drake.pushing.clusters import Cluster
 from riseg_drake.pushing.decision import Criterion, Ending, PathStage
 from riseg_drake.pushing.find_action import (
     FindActionParameters,
     find_action,
     stays_in_work_area,
     touching,
+    valid_pushes,
 )
 from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.pushing.tried_pushes import KnownScene, TriedPush
+from riseg_drake.robot.tool_shape import Overhang, ToolShape
 from tests.pushing.bar import BAR
 
 
@@ -181,7 +184,45 @@ def test_without_any_reachable_candidate_the_action_is_null_because_there_is_no_
     for n, push in enumerate(asked):
         for other in asked[:n]:
             far = np.linalg.norm(push.p_WE[:2] - other.p_WE[:2]) >= 0.01
-            assert far or push.direction_W @ other.direction_W <= np.cos(0.2)
+            unlike = push.direction_W @ other.direction_W <= np.cos(0.2)
+            assert far or unlike or push.turned != other.turned
+
+
+def test_the_back_of_the_tool_pushes_where_the_arm_cannot_with_its_front_and_only_there(drawn):
+    table, asked = drawn.disc(0.5, 0.0, 0.03).map(), []
+
+    def plan_path(push):
+        asked.append(push.turned)
+        return (np.zeros(7), "a path") if push.turned else PathStage.POSTURE
+
+    push = decide(table, plan_path=plan_path).push
+    assert push.turned
+    assert push.path[1] == "a path"
+    # All that could be pushed with its front was asked before.
+    assert asked[-1]
+    assert asked.index(True) == len(asked) - 1 > 10
+    assert push.yaw == pytest.approx(np.arctan2(*-push.direction_W[::-1]))
+    ahead = decide(table, plan_path=lambda push: (np.zeros(7), "a path")).push
+    assert not ahead.turned
+    assert ahead.yaw == pytest.approx(np.arctan2(*ahead.direction_W[::-1]))
+
+
+@pytest.mark.parametrize(("reaches", "turned"), [((-0.02, 0.09), [True]), ((-0.09, 0.02), [False])])
+def test_what_reaches_over_one_side_of_the_tip_may_be_kept_away_from_a_tall_thing(new_table, reaches, turned):
+    """A low box before a wall: what is 30 mm above the tip has no room on that side."""
+    drawn = new_table().box(0.5, 0.0, 0.04, 0.30, height=0.02)
+    drawn.box(0.57, 0.0, 0.06, 0.36, height=0.08, segmented=True)
+    tool = ToolShape(0.02, 0.03, 0.1, (Overhang(0.03, reaches, (-0.02, 0.02)),))
+    pushes, _ = valid_pushes(
+        [Cluster(np.array([0.5, 0.0]), drawn.objects & ~drawn.segmented)],
+        KnownScene(drawn.map()),
+        tool,
+        FindActionParameters(),
+        alone=False,
+    )
+    along_x = [push.turned for push in pushes if push.direction_W[0] > 0.95]
+    assert along_x
+    assert set(along_x) == set(turned)
 
 
 def test_ring_is_pushed_though_its_center_is_empty(drawn):

@@ -133,6 +133,34 @@ def test_tip_rises_first_where_the_observation_posture_is_lower_than_things(push
         assert away < push.length + 1e-3 or X_WE[2, 3] > 0.17
 
 
+def test_with_one_side_of_the_tool_or_the_other_the_arm_pushes_every_way(push, panda, q_observe):
+    fronts, backs = [], []
+    for yaw in np.deg2rad(np.arange(-180, 180, 40)):
+        for x, y in ((0.38, 0.12), (0.6, -0.12)):
+            along = np.array([np.cos(yaw), np.sin(yaw)])
+            at = replace(push, p_WE=np.array([x, y, push.p_WE[2]]), direction_W=along)
+            front, back = (
+                isinstance(plan_push_path(replace(at, turned=turned), panda, q_observe), PushPath)
+                for turned in (False, True)
+            )
+            assert front or back
+            fronts.append(front)
+            backs.append(back)
+    assert not all(fronts)
+    assert not all(backs)
+
+
+def test_with_its_back_the_tool_goes_the_same_way_turned_by_half_a_turn(push, panda, q_observe):
+    aside = replace(push, direction_W=np.array([0.0, -1.0]), p_WE=np.array([0.5, -0.12, push.p_WE[2]]))
+    ways = [plan_push_path(replace(aside, turned=turned), panda, q_observe) for turned in (False, True)]
+    assert all(isinstance(way, PushPath) for way in ways)
+    for share in (0.0, 0.3, 1.0):
+        times = [way.push_start + share * (way.push_end - way.push_start) for way in ways]
+        X_WE, X_WTurned = (panda.X_WE(way.position(time)) for way, time in zip(ways, times, strict=True))
+        np.testing.assert_allclose(X_WTurned[:3, 3], X_WE[:3, 3], atol=1e-4)
+        np.testing.assert_allclose(X_WE[:3, :3].T @ X_WTurned[:3, :3], np.diag([-1.0, -1.0, 1.0]), atol=1e-3)
+
+
 @pytest.mark.parametrize("x", [0.95, 0.05])
 def test_push_out_of_reach_has_no_path(push, panda, q_observe, x):
     assert plan_push_path(replace(push, p_WE=np.array([x, 0.1, 0.008])), panda, q_observe) is PathStage.POSTURE
@@ -195,8 +223,22 @@ def test_reaches_pushes_all_over_the_work_area(drawn, panda, q_observe, q_leanin
 
 
 def test_path_that_takes_too_long_is_no_path(push, panda, q_observe):
-    short = PushPathParameters(longest=push.path.duration - 0.1)
-    assert plan_push_path(push, panda, q_observe, short) is PathStage.DURATION
+    aside = replace(push, direction_W=np.array([0.0, -1.0]), p_WE=np.array([0.5, -0.12, push.p_WE[2]]))
+    path = plan_push_path(aside, panda, q_observe)
+    only = PushPathParameters(postures=1)
+    for longest, stage in ((path.duration + 0.01, None), (path.duration - 0.01, PathStage.DURATION)):
+        told = plan_push_path(aside, panda, q_observe, replace(only, longest=longest))
+        assert told is stage if stage else isinstance(told, PushPath)
+
+
+def test_where_one_posture_leads_nowhere_another_is_tried(panda, q_observe):
+    push = replace(NO_PUSH, p_WE=np.array([0.5, 0.0, 0.008]), direction_W=np.array([0.0, 1.0]))
+    push = replace(push, tip_height=0.008, length=0.03, tallest=0.05)
+    one = PushPathParameters(postures=1)
+    assert plan_push_path(push, panda, q_observe, one) is PathStage.DESCENT
+    path = plan_push_path(push, panda, q_observe, replace(one, postures=4))
+    assert isinstance(path, PushPath)
+    np.testing.assert_allclose(panda.X_WE(path.position(path.push_start))[:3, 3], push.p_WE, atol=1e-4)
 
 
 def test_no_joint_leaps_between_samples(push):

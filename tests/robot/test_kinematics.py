@@ -113,3 +113,19 @@ def test_the_jacobian_is_the_derivative_of_the_tip(panda):
     q, dq = READY, 1e-6 * np.arange(1, 8)
     V_WE = pose_error(panda.X_WE(q - dq / 2), panda.X_WE(q + dq / 2))
     np.testing.assert_allclose(panda.tip_jacobian(q) @ dq, V_WE, atol=1e-11)
+
+
+def test_the_free_postures_of_a_pose_are_the_nearest_first_and_each_unlike_all_before(panda):
+    X_WE = tip_pointing_down([0.5, 0.1, 0.1], 0.7)
+    near = panda.ready + 0.1
+    found = list(panda.free_postures(X_WE, near, apart=0.4))
+    assert len(found) > 3
+    np.testing.assert_array_equal(found[0], panda.solve_ik(X_WE, near))
+    for n, q in enumerate(found):
+        np.testing.assert_allclose(panda.X_WE(q), X_WE, atol=1e-9)
+        assert panda.clearance(q) >= 0.003
+        for before in found[:n]:
+            assert np.abs(q - before).max() >= 0.4
+    # Nothing that is unlike them is left out.
+    for q in panda.postures(X_WE):
+        assert panda.clearance(q) < 0.003 or min(np.abs(q - each).max() for each in found) < 0.4
