@@ -36,11 +36,10 @@ def freedoms_shown(
     pairs, which = np.unique((a * count + b)[a != b], return_inverse=True)
     if not len(pairs):
         return known
-    information, middle, number = _information(edges, gray, part[edges.piece], count)
+    information, middle = _information(edges, gray, part[edges.piece], count)
     i, j = np.divmod(pairs, count)
-    # About the middle of both, a turn by one over their radius moves them as far as a shift by one.
-    share = (number[j] / np.maximum(number[i] + number[j], 1))[:, None]
-    origin = middle[i] + share * (middle[j] - middle[i])
+    # About the point between them, a turn by one over the radius moves both as far as a shift by one.
+    origin = (middle[i] + middle[j]) / 2
     radius = np.maximum(np.linalg.norm(middle[i] - middle[j], axis=1) / 2, 1.0)
     I_i, I_j = (_about(information[k], origin - middle[k], radius) for k in (i, j))
     best = np.minimum(*(np.linalg.eigvalsh(each[:, :2, :2])[:, -1] for each in (I_i, I_j)))
@@ -54,21 +53,21 @@ def freedoms_shown(
 
 def _information(
     edges: EdgePixels, gray: NDArray[np.float32], owner: NDArray[np.intp], count: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Of each part about its middle: the information [P, 3, 3] on its shifts, px, and its turn, rad; the
-    middle [P, 2], px; the number of its pixels [P]."""
+    middle [P, 2], px."""
     v, u = edges.surface.pixel
     height, width = gray.shape
     right, left = gray[v, np.minimum(u + 1, width - 1)], gray[v, np.maximum(u - 1, 0)]
     below, above = gray[np.minimum(v + 1, height - 1), u], gray[np.maximum(v - 1, 0), u]
     slope = np.stack([right - left, below - above]) / (2 * np.sqrt(edges.variance))
-    number = np.bincount(owner, minlength=count).astype(float)
+    number = np.maximum(np.bincount(owner, minlength=count), 1)
     at = np.stack([u, v]).astype(float)
-    middle = np.stack([np.bincount(owner, x, count) for x in at], axis=1) / np.maximum(number, 1)[:, None]
+    middle = np.stack([np.bincount(owner, x, count) for x in at], axis=1) / number[:, None]
     x, y = at - middle[owner].T
     J = np.array([slope[0], slope[1], slope[1] * x - slope[0] * y])
     total = [[np.bincount(owner, k * m, count) for k in J] for m in J]
-    return np.moveaxis(np.array(total), 2, 0), middle, number
+    return np.moveaxis(np.array(total), 2, 0), middle
 
 
 def _about(

@@ -238,6 +238,9 @@ def test_where_one_posture_leads_nowhere_another_is_tried(panda, q_observe):
     assert plan_push_path(push, panda, q_observe, one) is PathStage.DESCENT
     path = plan_push_path(push, panda, q_observe, replace(one, postures=4))
     assert isinstance(path, PushPath)
+    # Of several that lead nowhere the nearest one's reason is told: the stroke alone takes longer than that.
+    none = replace(one, postures=4, longest=1.5)
+    assert plan_push_path(push, panda, q_observe, none) is PathStage.DESCENT
     np.testing.assert_allclose(panda.X_WE(path.position(path.push_start))[:3, 3], push.p_WE, atol=1e-4)
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import PandaKinematics
-from riseg_drake.robot.tool_shape import TIP_REACH, Overhang
+from riseg_drake.robot.tool_shape import TIP_REACH, Overhang, ToolShape
 from tests.robot.own_tools import CAMERA, STICK, TIP, box, sdf
 
 
@@ -103,3 +103,9 @@ def test_a_tool_that_widens_evenly_hangs_over_in_steps_each_no_higher_than_it_is
     for over in tool.overhangs:
         z = min(over.bottom + 0.01, 0.02 * np.sqrt(2))
         assert np.ptp(over.x) == pytest.approx(2 * z, abs=1e-6)
+
+
+def test_a_tool_that_is_turned_has_ahead_and_to_the_right_what_it_had_behind_and_to_the_left():
+    one_sided = ToolShape(0.02, 0.03, 0.1, (Overhang(0.04, (-0.02, 0.09), (-0.01, 0.05)),))
+    assert one_sided.turned() == ToolShape(0.02, 0.03, 0.1, (Overhang(0.04, (-0.09, 0.02), (-0.05, 0.01)),))
+    assert one_sided.turned().turned() == one_sided
