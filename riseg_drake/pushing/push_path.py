@@ -115,11 +115,8 @@ def plan_push_path(
         legs = _crossing(q_observe, climb[-1], crossing, kinematics, parameters)
         if legs is None:
             return PathStage.CROSSING
-        return in_time([*legs, climb[::-1], stroke])
-
-    def in_time(legs: list[NDArray]) -> PushPath | PathStage:
         limits = parameters.limits.limits()
-        path = _in_time(legs, push.length, limits, kinematics.limits, parameters)
+        path = _in_time([*legs, climb[::-1], stroke], push.length, limits, kinematics.limits, parameters)
         longest = LONGEST * max(limits.slowness, 1.0) if parameters.longest is None else parameters.longest
         return path if path.duration <= longest else PathStage.DURATION
 

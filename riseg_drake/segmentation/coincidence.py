@@ -15,8 +15,8 @@ from riseg_drake.segmentation.alignment import EdgePixels
 FREEDOMS = 3
 """Of a rigid motion in the image: two shifts and a turn."""
 _FAINT = 0.05
-"""Of what a thing shows of a shift, this share of it shows something: shading and noise turn gradients aside a
-little. Set by hand."""
+"""A freedom is shown where there is more than this share of what shows a shift best: shading and noise turn
+gradients aside a little. Set by hand."""
 
 
 def freedoms_shown(
