@@ -46,8 +46,9 @@ class FindActionParameters:
     pusher: PusherParameters = field(default_factory=PusherParameters)
     gain: GainParameters = field(default_factory=GainParameters)
     levels: LevelsParameters = field(default_factory=LevelsParameters)
-    paths: int = 30
-    """The arm's path is planned for at most this many candidates, the best that are not alike."""
+    paths: int = 15
+    """The arm's path is planned for at most this many candidates, the best that are not alike, with the tool's
+    front, and as many with its back."""
 
 
 def find_action(
@@ -114,6 +115,7 @@ class _PathSearch:
         self._plan_path, self._most = plan_path, most
         self._places: list[NDArray] = []  # p_WE and the tool's own direction of the pushes that have no path
         self._ahead: list[NDArray] = []
+        self._asked = [0, 0]  # with the tool's front, and with its back
         self.failed: Counter[Criterion | PathStage] = Counter()
         """How many pushes failed at each stage."""
 
@@ -122,10 +124,9 @@ class _PathSearch:
         if self._plan_path is None:
             return pushes[0] if pushes else None
         for push in pushes:
-            if len(self._places) == self._most:
-                return None
-            if self._is_like_one_that_failed(push):
+            if self._asked[push.turned] == self._most or self._is_like_one_that_failed(push):
                 continue
+            self._asked[push.turned] += 1
             path = self._plan_path(push)
             if not isinstance(path, PathStage):
                 return replace(push, path=path)
