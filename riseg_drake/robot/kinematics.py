@@ -177,8 +177,8 @@ class PandaKinematics:
         min_clearance: float = MIN_CLEARANCE,
         apart: float = 0.3,
     ) -> Iterator[NDArray[np.float64]]:
-        """What `solve_ik` takes, and then, if asked again, the next best of which some joint is `apart`, rad,
-        from where it is in each before."""
+        """Joint angles [7], rad, as `solve_ik` takes them for X_WE [4, 4], near q_near [7], and then, if asked
+        again, the next best of which some joint is `apart`, rad, from where it is in each before."""
         q_near = self.ready if q_near is None else q_near
         q = self.postures(X_WE, margin)
         q = q[np.argsort(np.abs(q - q_near).max(axis=1) - 0.2 * self.limits.room(q).min(axis=1))]
