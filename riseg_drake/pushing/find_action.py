@@ -113,7 +113,7 @@ class _PathSearch:
 
     def __init__(self, plan_path: PlanPath | None, most: int):
         self._plan_path, self._most = plan_path, most
-        self._places: list[NDArray] = []  # p_WE and the tool's own direction of the pushes that have no path
+        self._places: list[NDArray] = []  # p_WE and ahead_W of the pushes that have no path
         self._ahead: list[NDArray] = []
         self._asked = [0, 0]  # with the tool's front, and with its back
         self.failed: Counter[Criterion | PathStage] = Counter()
@@ -132,20 +132,15 @@ class _PathSearch:
                 return replace(push, path=path)
             self.failed[path] += 1
             self._places.append(push.p_WE[:2])
-            self._ahead.append(_tool_ahead_W(push))
+            self._ahead.append(push.ahead_W)
         return None
 
     def _is_like_one_that_failed(self, push: Push) -> bool:
         if not self._places:
             return False
         near = np.linalg.norm(np.array(self._places) - push.p_WE[:2], axis=1) < ALIKE_DISTANCE
-        alike = np.array(self._ahead) @ _tool_ahead_W(push) > np.cos(ALIKE_ANGLE)
+        alike = np.array(self._ahead) @ push.ahead_W > np.cos(ALIKE_ANGLE)
         return bool(np.any(near & alike))
-
-
-def _tool_ahead_W(push: Push) -> NDArray[np.float64]:
-    """E's x axis [2]."""
-    return np.array([np.cos(push.yaw), np.sin(push.yaw)])
 
 
 def valid_pushes(

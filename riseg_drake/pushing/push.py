@@ -41,10 +41,14 @@ class Push(Immutable):
     """The arm's way there and back; None until it has been planned."""
 
     @property
+    def ahead_W(self) -> NDArray[np.float64]:
+        """[2], E's x axis: where the tool's front points."""
+        return -self.direction_W if self.turned else self.direction_W
+
+    @property
     def yaw(self) -> float:
         """Of the tool, the direction of E's x axis about W's z, rad."""
-        sign = -1.0 if self.turned else 1.0
-        return float(np.arctan2(sign * self.direction_W[1], sign * self.direction_W[0]))
+        return float(np.arctan2(self.ahead_W[1], self.ahead_W[0]))
 
 
 NO_PUSH = Push(

@@ -137,14 +137,17 @@ def bodies_of(
     motion explains falls apart for it.
     """
     keyframe = belief.keyframe
-    bond = belief.with_evidence(seen.evidence, parameters).bond
-    part = partition(keyframe, bond, parameters.partition, seen.nats)
+
+    def parts_by(evidence: NDArray[np.float64]) -> NDArray[np.intp]:
+        bond = belief.with_evidence(evidence, parameters).bond
+        return partition(keyframe, bond, parameters.partition, seen.nats)
+
+    part = parts_by(seen.evidence)
     if keyframe.across.any():
         # What lies about a gap says little of its motion; all of both pieces together may be sure of it.
         of_parts = evidence_of_parts(seen, keyframe, part, belief.shown, observation)
         seen = replace(seen, evidence=np.where(keyframe.across, of_parts, seen.evidence))
-        bond = belief.with_evidence(seen.evidence, parameters).bond
-        part = partition(keyframe, bond, parameters.partition, seen.nats)
+        part = parts_by(seen.evidence)
     seen = replace(seen, evidence=seen.evidence + apart(keyframe, part, seen.nats, parameters.partition))
     motion = motions_of_parts(part, seen.nats, parameters.partition)
     found_before = np.bincount(part, keyframe.area * (belief.body > 0), len(motion))

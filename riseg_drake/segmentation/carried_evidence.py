@@ -1,6 +1,6 @@
 """What is known of borders, carried to a new keyframe, whose superpixels and borders are others."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,15 +49,13 @@ def carried_evidence(
     from_a, from_b = origin.source[a], origin.source[b]
     known = (from_a >= 0) & (from_b >= 0)
     same_border, place = _same_borders(old.keyframe, from_a, from_b)
-    remembered = alike = np.zeros(len(a))
-    if len(old.evidence):
-        # A gap that was seen once is remembered when it has closed.
-        remembered = old.evidence[place] + np.minimum(old.prior[place] - new_prior, 0)
-        alike = old.alike[place]
+    was, prior, alike = (np.append(each, 0.0)[place] for each in (old.evidence, old.prior, old.alike))
+    # A gap that was seen once is remembered when it has closed.
+    remembered = was + np.minimum(prior - new_prior, 0)
     stood = ((from_a < 0) ^ (from_b < 0)) & ~moved[a] & ~moved[b]
     # What has parted is two, and so is what may lie on the other and goes along with it; what was told apart by
     # less is as much two as all that was seen between them says.
-    two, between = -2 * inside, _between_bodies(old, new, body)
+    two, (between, alike_between) = -2 * inside, _between_bodies(old, new, body)
     unlike = np.where((between > -inside) & ~new.over, between, two)
     apart = np.where(
         body[a] == body[b],
@@ -67,28 +65,33 @@ def carried_evidence(
     )
     evidence = np.where(known & (from_a == from_b), inside, np.where(same_border, remembered, apart))
     evidence = np.where(known | (body[a] > 0) | (body[b] > 0), evidence, 0.0)
-    between = np.maximum(_between_bodies(replace(old, evidence=old.alike), new, body), 0.0)
-    return evidence, np.where(same_border, alike, np.where(body[a] != body[b], between, 0.0))
+    of_two = np.where(body[a] != body[b], np.maximum(alike_between, 0.0), 0.0)
+    return evidence, np.where(same_border, alike, of_two)
 
 
 def _same_borders(
     old: Keyframe, from_a: NDArray[np.intp], from_b: NDArray[np.intp]
 ) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
     """Which borders between what was `from_a` and `from_b` [M], -1 for nothing, the old keyframe had, and where
-    among its own [M]."""
+    among its own [M]; what it did not have may be one beyond its last."""
     code = np.minimum(from_a, from_b) * old.count + np.maximum(from_a, from_b)
-    old_code = old.borders[:, 0] * old.count + old.borders[:, 1]  # rising
-    place = np.clip(np.searchsorted(old_code, code), 0, max(len(old_code) - 1, 0))
-    if not len(old_code):
-        return np.zeros(len(code), bool), place
+    old_code = np.append(old.borders @ [old.count, 1], old.count**2)  # rising
+    place = np.searchsorted(old_code, code)
     return (from_a >= 0) & (from_b >= 0) & (from_a != from_b) & (old_code[place] == code), place
 
 
-def _between_bodies(old: KnownBorders, new: Keyframe, body: NDArray[np.intp]) -> NDArray[np.float64]:
-    """[M], the mean evidence of all borders that both bodies of a new border had; -inf if they had none."""
+def _between_bodies(
+    old: KnownBorders, new: Keyframe, body: NDArray[np.intp]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The mean evidence [M] of all borders that both bodies of a new border had, and of that for having moved
+    alike [M]; -inf if they had none."""
     pairs = np.sort(np.concatenate([old.body[old.keyframe.borders], body[new.borders]]), axis=1)
     _, pair = np.unique(pairs, axis=0, return_inverse=True)
     before, now = np.split(pair.ravel(), [len(old.evidence)])
     length = np.bincount(before, old.keyframe.length, len(pairs))
-    total = np.bincount(before, old.keyframe.length * old.evidence, len(pairs))
-    return np.divide(total, length, out=np.full(len(pairs), -np.inf), where=length > 0)[now]
+
+    def mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        total = np.bincount(before, old.keyframe.length * values, len(pairs))
+        return np.divide(total, length, out=np.full(len(pairs), -np.inf), where=length > 0)[now]
+
+    return mean(old.evidence), mean(old.alike)
