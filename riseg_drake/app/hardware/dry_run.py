@@ -6,7 +6,7 @@ import numpy as np
 from rich.console import Console
 
 from riseg_drake.app.hardware.planned_motion import PlannedMotion
-from riseg_drake.app.hardware.terminal_operator import TerminalOperator
+from riseg_drake.app.hardware.terminal_operator import TerminalOperator, with_which_side
 from riseg_drake.app.run.interactions import Progress
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.pushing.push import Push
@@ -68,7 +68,7 @@ class DryRun:
         lowest = min(self._kinematics.clearance(push.path.position(t)) for t in times)
         x, y = push.p_WB[:2]
         self._console.print(
-            f"push {self._shown} at ({x:.3f}, {y:.3f}) m, tip at z = {push.p_WE[2]:.3f} m, "
-            f"{push.path.duration:.1f} s, nothing nearer than "
+            f"push {self._shown} at ({x:.3f}, {y:.3f}) m{with_which_side(push)}, "
+            f"tip at z = {push.p_WE[2]:.3f} m, {push.path.duration:.1f} s, nothing nearer than "
             f"{1e3 * lowest:.0f} mm to table or arm"
         )

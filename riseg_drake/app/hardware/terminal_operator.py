@@ -63,8 +63,8 @@ class TerminalOperator:
         x, y = push.p_WB[:2]
         said = self.answer(
             f"push at ({x:.3f}, {y:.3f}) m by {100 * push.d_push:.0f} cm towards "
-            f"({push.direction_W[0]:+.2f}, {push.direction_W[1]:+.2f}), tip at z = {push.p_WE[2]:.3f} m: "
-            "y to do it, n for another, q to end",
+            f"({push.direction_W[0]:+.2f}, {push.direction_W[1]:+.2f}){with_which_side(push)}, "
+            f"tip at z = {push.p_WE[2]:.3f} m: y to do it, n for another, q to end",
             f"y n {QUIT}",
         )
         return {"": Permission.WAIT, "y": Permission.DO, "n": Permission.SKIP}.get(said, Permission.END)
@@ -114,3 +114,8 @@ class TerminalOperator:
         for line in self._terminal:
             self._lines.put(line.strip().lower())
         self._closed = True
+
+
+def with_which_side(push: Push) -> str:
+    """What the operator is told where the tool, and the camera on it, will turn around."""
+    return " with the back of the tool" if push.turned else ""

@@ -40,7 +40,8 @@ def push(turn=0.2):
     path = SimpleNamespace(
         duration=2.0, position=lambda t: READY + np.array([turn * t / 2.0, 0, 0, 0, 0, 0, 0])
     )
-    return SimpleNamespace(path=path, p_WB=np.array([0.5, 0.1, 0.02]), p_WE=np.array([0.46, 0.1, 0.031]))
+    contact, tip = np.array([0.5, 0.1, 0.02]), np.array([0.46, 0.1, 0.031])
+    return SimpleNamespace(path=path, p_WB=contact, p_WE=tip, turned=False)
 
 
 def made(*answers):

@@ -60,7 +60,7 @@ def test_the_diagram_is_wired_and_a_dry_run_tells_of_that_tool_s_clearance(scena
     out, q = io.StringIO(), arm.ready
     run = DryRun(scenario, None, None, Console(file=out, width=200), Progress())
     path = SimpleNamespace(duration=1.0, position=lambda _: q)
-    run.permit(SimpleNamespace(path=path, p_WB=np.zeros(3), p_WE=np.zeros(3)))
+    run.permit(SimpleNamespace(path=path, p_WB=np.zeros(3), p_WE=np.zeros(3), turned=False))
     assert f"nothing nearer than {1e3 * arm.clearance(q):.0f} mm" in out.getvalue()
 
 

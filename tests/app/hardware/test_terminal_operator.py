@@ -1,5 +1,6 @@
 import io
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -61,6 +62,13 @@ def test_a_push_waits_for_its_answer(typed, permission):
     assert answer is permission
     assert out.getvalue().count("push at (0.420, 0.000)") == 1
     assert "tip at z = 0.020 m" in out.getvalue()
+    assert "back of the tool" not in out.getvalue()
+
+
+def test_the_operator_is_told_where_the_tool_turns_around():
+    person, terminal, out = operator("y\n")
+    ask(person, terminal, lambda: person.permit(replace(PUSH, turned=True)))
+    assert ") with the back of the tool, tip at z = 0.020 m" in out.getvalue()
 
 
 def test_what_is_no_answer_is_asked_again():
