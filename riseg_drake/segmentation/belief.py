@@ -10,7 +10,7 @@ from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
 from riseg_drake.geometry.se3 import inverse, seen_from
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.border_prior import BorderPriorParameters, border_prior
-from riseg_drake.segmentation.carried_evidence import KnownBorders, Origin, carried_evidence
+from riseg_drake.segmentation.carried_evidence import KnownBorders, Origin, carried_evidence, were_in_sight
 from riseg_drake.segmentation.coincidence import freedoms_shown
 from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe
 from riseg_drake.segmentation.noise import MeasurementNoise
@@ -217,7 +217,8 @@ def next_belief(
         belief = belief.with_evidence(seen.evidence, parameters)
     body = np.where(known, bodies.body[source], _most_seen(new, np.where(carried == 0, ids, 0)))
     prior = border_prior(new, parameters.prior)
-    origin = Origin(source, body, moved=known & (bodies.motion[source] > 0))
+    in_sight = were_in_sight(old, new, source, bodies.motion[source], bodies.motions_K)
+    origin = Origin(source, body, in_sight)
     known_borders = KnownBorders(old, belief.prior, belief.evidence, belief.alike, bodies.body)
     evidence, alike = carried_evidence(known_borders, new, prior, origin, parameters.inside)
     part = partition(new, prior + evidence, parameters.partition)

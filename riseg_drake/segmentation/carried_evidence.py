@@ -6,7 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.rgbd import Immutable
+from riseg_drake.geometry.se3 import inverse
 from riseg_drake.segmentation.keyframe import Keyframe
+from riseg_drake.segmentation.propagation import DEPTH_AGREES
+from riseg_drake.segmentation.surface import seek, surface_pixels
+
+_MOST = 0.5
+"""Share of a superpixel's pixels."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +38,44 @@ class Origin:
     """[N], superpixel of the old keyframe; -1 where it shows none."""
     body: NDArray[np.intp]
     """[N], ids."""
-    moved: NDArray[np.bool_]
-    """[N], whether it has moved since."""
+    in_sight: NDArray[np.bool_]
+    """[M], of each border of the new keyframe: of its sides one is new, and as one with the other it would have
+    been seen before."""
+
+
+def were_in_sight(
+    old: Keyframe,
+    new: Keyframe,
+    source: NDArray[np.intp],
+    motion: NDArray[np.intp],
+    motions_K: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """[M], the borders of a new keyframe one side of which is new, though it would have been in sight before.
+
+    If it is one body with the other side, it was somewhere then. Either it was hidden, by anything, itself too
+    (a thing that turns shows a new side), or the old keyframe would have shown it.
+
+    Args:
+        old: a keyframe.
+        new: the next one, of N superpixels and M borders.
+        source: [N], which superpixel of the old one each is; -1 where that shows none.
+        motion: [N], index of the motion that each has made since; of no meaning where it is new.
+        motions_K: [G, 4, 4], seen from the old keyframe's camera.
+    """
+    is_new = source < 0
+    in_sight = np.zeros(len(new.borders), bool)
+    owner_of = new.image_of(np.where(is_new, np.arange(new.count), -1), outside=-1)
+    pixels = surface_pixels(owner_of >= 0, new.frame.depth, new.frame.intrinsics)
+    owner = owner_of.ravel().take(pixels.index)
+    count = np.maximum(np.bincount(owner, minlength=new.count), 1)
+    X_ON = inverse(old.frame.X_WC) @ new.frame.X_WC
+    for k in np.unique(motion[~is_new]):
+        then = seek(pixels, inverse(motions_K[k]) @ X_ON)
+        seen = then.read(old.frame.depth) > then.depth - DEPTH_AGREES
+        was_seen = np.bincount(owner[seen], minlength=new.count) > _MOST * count
+        for one, other in (new.borders.T, new.borders.T[::-1]):
+            in_sight |= is_new[one] & ~is_new[other] & (motion[other] == k) & was_seen[one]
+    return in_sight
 
 
 def carried_evidence(
@@ -41,18 +83,18 @@ def carried_evidence(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Evidence [M] for the borders of the new keyframe, and how much of it as both sides have moved alike [M].
 
-    What a body uncovered that moved away is not that body; of others that stood beside it, it may be. Of what
-    was one superpixel before, both sides are one body by `inside` nats.
+    What comes into sight may be of any body beside it with which it was hidden before. Of what was one
+    superpixel before, both sides are one body by `inside` nats.
     """
     a, b = new.borders.T
-    body, moved = origin.body, origin.moved
+    body = origin.body
     from_a, from_b = origin.source[a], origin.source[b]
     known = (from_a >= 0) & (from_b >= 0)
     same_border, place = _same_borders(old.keyframe, from_a, from_b)
     was, prior, alike = (np.append(each, 0.0)[place] for each in (old.evidence, old.prior, old.alike))
     # A gap that was seen once is remembered when it has closed.
     remembered = was + np.minimum(prior - new_prior, 0)
-    stood = ((from_a < 0) ^ (from_b < 0)) & ~moved[a] & ~moved[b]
+    hidden = ((from_a < 0) ^ (from_b < 0)) & ~origin.in_sight
     # What has parted is two, and so is what may lie on the other and goes along with it; what was told apart by
     # less is as much two as all that was seen between them says.
     two, (between, alike_between) = -2 * inside, _between_bodies(old, new, body)
@@ -61,7 +103,7 @@ def carried_evidence(
         body[a] == body[b],
         # A gap in what is one body is one in the picture.
         np.where(body[a] > 0, inside / 2 - np.where(new.across, new_prior, 0.0), 0),
-        np.where(stood, 0, unlike),
+        np.where(hidden, 0, unlike),
     )
     evidence = np.where(known & (from_a == from_b), inside, np.where(same_border, remembered, apart))
     evidence = np.where(known | (body[a] > 0) | (body[b] > 0), evidence, 0.0)

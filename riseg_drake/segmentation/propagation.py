@@ -22,7 +22,7 @@ from riseg_drake.segmentation.surface import SurfacePixels, seek, surface_pixels
 UNKNOWN = np.uint16(65535)
 """Label of pixels above the table that no object has claimed yet; never leaves the propagator."""
 
-_DEPTH_AGREES = 0.008
+DEPTH_AGREES = 0.008
 """m; a point and the surface it is looked up on are the same within that (noise, slopes, edges)."""
 
 _REACH = 0.005
@@ -65,7 +65,7 @@ def carry_labels(
         return np.zeros(above_1.mask.shape, np.uint16)
     surface = surface_pixels(above_1.mask, current.depth, current.intrinsics)
     label = np.zeros(len(surface), np.uint16)
-    gap = np.full(len(surface), _DEPTH_AGREES, np.float32)
+    gap = np.full(len(surface), DEPTH_AGREES, np.float32)
     for moves, motion in _by_motion(motion_of):
         found, apart = _look_up(surface, inverse(pair.X_C1C0 @ motion), label_0, pair.reference)
         better = (apart < gap) & moves.take(found)
@@ -142,7 +142,7 @@ def nearest_label(
             # On its own occlusion boundary a thing has no depth, or that of what is behind it.
             front = cv2.erode(np.where((old > 0) & (z > 0), z, np.float32(np.inf)), _BOUNDARY)
             z_labelled, z = front.ravel()[nearest], z.ravel()[near]
-            other = broad & (z > 0) & np.isfinite(z_labelled) & (np.abs(z - z_labelled) > _DEPTH_AGREES)
+            other = broad & (z > 0) & np.isfinite(z_labelled) & (np.abs(z - z_labelled) > DEPTH_AGREES)
             near, nearest = near[~other], nearest[~other]
         filled.ravel()[near] = old.ravel()[nearest]
     out[region] = filled
@@ -182,5 +182,5 @@ def _look_up(
     sought = seek(surface, X_C0C1)
     z_0 = sought.read(reference.depth)
     # Where depth has a hole the label alone must do, but any measured agreement is better.
-    apart = np.where(z_0 > 0, np.abs(z_0 - sought.depth), np.float32(0.99 * _DEPTH_AGREES))
+    apart = np.where(z_0 > 0, np.abs(z_0 - sought.depth), np.float32(0.99 * DEPTH_AGREES))
     return sought.read(label_0), apart

@@ -181,10 +181,15 @@ def test_a_new_keyframe_knows_its_superpixels_by_what_the_old_ones_carry_and_wha
         given.update(old=old, origin=origin)
         return np.array([0.5]), np.array([0.25])
 
+    def in_sight(old, new, source, motion, motions_K):
+        assert motions_K is STILL_AND_MOVED
+        return old, new, source.tolist(), motion[:2].tolist(), list(range(len(motions_K)))
+
     monkeypatch.setattr(module, "_carry", carry)
     monkeypatch.setattr(module, "make_keyframe", keyframe)
     monkeypatch.setattr(module, "border_prior", lambda *_: np.array([1.0]))
     monkeypatch.setattr(module, "carried_evidence", evidence_for)
+    monkeypatch.setattr(module, "were_in_sight", in_sight)
     monkeypatch.setattr(module, "partition", lambda keyframe, bond, parameters: np.array([0, 1, 2, 2]))
     monkeypatch.setattr(module, "freedoms_shown", lambda *given: given)
     seen = Observation(*[None] * 3, np.array([2.0, -2.0, 0.25]), *[None] * 2) if watched else None
@@ -196,7 +201,7 @@ def test_a_new_keyframe_knows_its_superpixels_by_what_the_old_ones_carry_and_wha
     origin = given["origin"]
     assert origin.source.tolist() == [0, 1, -1, -1]
     assert origin.body.tolist() == [5, 0, 7, 0]
-    assert origin.moved.tolist() == [True, False, False, False]
+    assert origin.in_sight == (old.keyframe, new, [0, 1, -1, -1], [1, 0], [0, 1])
     np.testing.assert_array_equal(given["old"].evidence, evidence)
     np.testing.assert_array_equal(given["old"].alike, alike)
     np.testing.assert_array_equal(given["old"].body, [5, 0, 6])
