@@ -9,7 +9,7 @@ from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.geometry.se3 import inverse, move_points
 from riseg_drake.segmentation.alignment import AlignmentParameters, rigid_fit
-from riseg_drake.segmentation.belief import Bodies
+from riseg_drake.segmentation.bodies import Bodies
 from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.motions import BFIFGroups, flow_difference

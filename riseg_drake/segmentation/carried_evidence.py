@@ -5,29 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.rgbd import Immutable
 from riseg_drake.geometry.se3 import inverse
+from riseg_drake.segmentation.belief import Belief
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.propagation import DEPTH_AGREES
 from riseg_drake.segmentation.surface import seek, surface_pixels
 
 _MOST = 0.5
 """Share of a superpixel's pixels."""
-
-
-@dataclass(frozen=True)
-class KnownBorders(Immutable):
-    """Of the N superpixels and M borders of an old keyframe."""
-
-    keyframe: Keyframe
-    prior: NDArray[np.float64]
-    """[M], log-odds that both sides of a border are one body, by the still picture."""
-    evidence: NDArray[np.float64]
-    """[M], what motion has added."""
-    alike: NDArray[np.float64]
-    """[M], how much of it as both sides have moved alike."""
-    body: NDArray[np.intp]
-    """[N], ids; 0 where nothing has moved yet."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +64,7 @@ def were_in_sight(
 
 
 def carried_evidence(
-    old: KnownBorders, new: Keyframe, new_prior: NDArray[np.float64], origin: Origin, inside: float
+    old: Belief, new: Keyframe, new_prior: NDArray[np.float64], origin: Origin, inside: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Evidence [M] for the borders of the new keyframe, and how much of it as both sides have moved alike [M].
 
@@ -123,7 +108,7 @@ def _same_borders(
 
 
 def _between_bodies(
-    old: KnownBorders, new: Keyframe, body: NDArray[np.intp]
+    old: Belief, new: Keyframe, body: NDArray[np.intp]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The mean evidence [M] of all borders that both bodies of a new border had, and of that for having moved
     alike [M]; -inf if they had none."""

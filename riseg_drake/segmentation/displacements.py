@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import rays
 from riseg_drake.geometry.se3 import inverse, move_points, seen_from
-from riseg_drake.segmentation.belief import Bodies
+from riseg_drake.segmentation.bodies import Bodies
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.propagation import UNKNOWN, pixels_of
 from riseg_drake.segmentation.segmentation import Segmentation

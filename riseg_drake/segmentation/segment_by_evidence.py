@@ -15,18 +15,9 @@ from riseg_drake.geometry.camera import rays
 from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.geometry.se3 import inverse, move_points, seen_from
 from riseg_drake.segmentation.above_table import AboveTable
-from riseg_drake.segmentation.belief import (
-    Belief,
-    BeliefParameters,
-    Bodies,
-    bodies_of,
-    carry_bodies,
-    first_belief,
-    next_belief,
-    rebased,
-    standing,
-)
+from riseg_drake.segmentation.belief import Belief, BeliefParameters
 from riseg_drake.segmentation.bfif import BFIFParameters
+from riseg_drake.segmentation.bodies import Bodies, bodies_of, carry_bodies, rebased, standing
 from riseg_drake.segmentation.candidates import candidate_motions
 from riseg_drake.segmentation.comparison import Comparison, renewed_view_error
 from riseg_drake.segmentation.frame_pairs import camera_span
@@ -39,6 +30,7 @@ from riseg_drake.segmentation.motion_search import (
     search_motions,
 )
 from riseg_drake.segmentation.motions import BFIFGroups
+from riseg_drake.segmentation.next_keyframe import first_belief, next_belief
 from riseg_drake.segmentation.observation import (
     Observation,
     ObservationParameters,

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.rgbd import Frame, Immutable
-from riseg_drake.segmentation.belief import Belief, Bodies
+from riseg_drake.segmentation.belief import Belief
+from riseg_drake.segmentation.bodies import Bodies
 from riseg_drake.segmentation.comparison import ViewError
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.memory import Memory

@@ -5,12 +5,14 @@ import pytest
 
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.segmentation.alignment import AlignmentParameters
-from riseg_drake.segmentation.belief import Belief, BeliefParameters, Bodies, first_belief
-from riseg_drake.segmentation.belief import standing as still
+from riseg_drake.segmentation.belief import Belief, BeliefParameters
 from riseg_drake.segmentation.bfif import no_groups
+from riseg_drake.segmentation.bodies import Bodies
+from riseg_drake.segmentation.bodies import standing as still
 from riseg_drake.segmentation.candidates import candidate_motions
 from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.motions import BFIFGroups, flow_difference
+from riseg_drake.segmentation.next_keyframe import first_belief
 from riseg_drake.segmentation.noise import MeasurementNoise
 from tests.segmentation.drawn_scene import (
     CAMERA,

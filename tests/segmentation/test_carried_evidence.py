@@ -8,7 +8,8 @@ import pytest
 from riseg_drake.geometry.camera import rays
 from riseg_drake.geometry.se3 import move_points, translation
 from riseg_drake.segmentation.above_table import AboveTableParameters, objects_above_table
-from riseg_drake.segmentation.carried_evidence import KnownBorders, Origin, carried_evidence, were_in_sight
+from riseg_drake.segmentation.belief import Belief
+from riseg_drake.segmentation.carried_evidence import Origin, carried_evidence, were_in_sight
 from riseg_drake.segmentation.keyframe import KeyframeParameters, make_keyframe
 from riseg_drake.segmentation.noise import MeasurementNoise
 from tests.segmentation.drawn_scene import CAMERA, DrawnScene, looking_down, motion_seen_from
@@ -40,7 +41,7 @@ def carried(
     evidence = np.array(old_evidence, float)
     was = np.full(len(evidence), 2.0)
     of_it = np.zeros(len(evidence)) if alike is None else np.array(alike)
-    old = KnownBorders(keyframe, was, evidence, of_it, old_body)
+    old = Belief(keyframe, was, evidence, of_it, np.array(old_body), *[None] * 4)
     across = np.zeros(len(new_borders), bool) if across is None else np.array(across)
     new = SimpleNamespace(borders=np.array(new_borders), across=across, over=np.full(len(across), over))
     told = carried_evidence(old, new, np.full(len(new_borders), prior), origin, inside=2.0)

@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import NO_FRAME
 from riseg_drake.geometry.se3 import inverse
-from riseg_drake.segmentation.belief import Bodies
+from riseg_drake.segmentation.bodies import Bodies
 from riseg_drake.segmentation.displacements import Displacements
 from riseg_drake.segmentation.segmentation import Segmentation
 from tests.segmentation.drawn_scene import looking_down

@@ -7,7 +7,7 @@ import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
 from riseg_drake.segmentation import motion_search
-from riseg_drake.segmentation.belief import BeliefParameters, first_belief
+from riseg_drake.segmentation.belief import BeliefParameters
 from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.likelihood import motion_costs, unexplained_parts
 from riseg_drake.segmentation.motion_search import (
@@ -18,6 +18,7 @@ from riseg_drake.segmentation.motion_search import (
     search_motions,
 )
 from riseg_drake.segmentation.motions import flow_difference
+from riseg_drake.segmentation.next_keyframe import first_belief
 from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.observation import ObservationParameters, observe
 from riseg_drake.segmentation.slides import slides

@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from riseg_drake.segmentation.belief import BeliefParameters, first_belief
+from riseg_drake.segmentation.belief import BeliefParameters
 from riseg_drake.segmentation.comparison import Comparison
+from riseg_drake.segmentation.next_keyframe import first_belief
 from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.observation import (
     ObservationParameters,

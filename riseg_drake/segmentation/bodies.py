@@ -1,0 +1,140 @@
+"""The bodies of a keyframe: what one frame says of them, and where they are in its view."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
+from riseg_drake.geometry.se3 import inverse, seen_from
+from riseg_drake.segmentation.above_table import AboveTable
+from riseg_drake.segmentation.belief import Belief, BeliefParameters
+from riseg_drake.segmentation.keyframe import Keyframe
+from riseg_drake.segmentation.observation import Observation, ObservationParameters, evidence_of_parts
+from riseg_drake.segmentation.partition import apart, motions_of_parts, partition, with_ids
+from riseg_drake.segmentation.propagation import UNKNOWN, carry_labels, draw_labels
+
+_BLIND = 0.004
+"""Share of a picture that has no depth, and is not the robot, from which that matters."""
+
+
+@dataclass(frozen=True)
+class Bodies(Immutable):
+    """The bodies of a keyframe, and how they have moved since."""
+
+    body: NDArray[np.intp]
+    """[N], ids; 0 where nothing has moved yet."""
+    motion: NDArray[np.intp]
+    """[N], index into `motions_K`; the same for all of a body."""
+    motions_K: NDArray[np.float64]
+    """[G, 4, 4], seen from the keyframe's camera; the first is standing still."""
+    next_id: int
+
+    def seen_from(self, X_NK: NDArray[np.float64]) -> "Bodies":
+        """The same with motions as a camera N sees them, in which the keyframe's has the pose X_NK [4, 4]."""
+        return replace(self, motions_K=seen_from(X_NK, self.motions_K))
+
+
+def standing(belief: Belief) -> Bodies:
+    """The bodies where nothing has moved since the keyframe."""
+    still = np.zeros(belief.keyframe.count, np.intp)
+    return Bodies(belief.body, still, np.eye(4)[None], belief.next_id)
+
+
+def bodies_of(
+    belief: Belief,
+    seen: Observation,
+    before: Bodies | None,
+    parameters: BeliefParameters,
+    observation: ObservationParameters,
+) -> tuple[Observation, Bodies]:
+    """The bodies, with what one frame says, and that with what the bodies' motions add to its evidence.
+
+    Ids are those of the belief, and for what it did not know those of the frame before. A body that no one
+    motion explains falls apart for it.
+    """
+    keyframe = belief.keyframe
+
+    def parts_by(evidence: NDArray[np.float64]) -> NDArray[np.intp]:
+        bond = belief.with_evidence(evidence, parameters).bond
+        return partition(keyframe, bond, parameters.partition, seen.nats)
+
+    part = parts_by(seen.evidence)
+    if keyframe.across.any():
+        # What lies about a gap says little of its motion; all of both pieces together may be sure of it.
+        of_parts = evidence_of_parts(seen, keyframe, part, belief.shown, observation)
+        seen = replace(seen, evidence=np.where(keyframe.across, of_parts, seen.evidence))
+        part = parts_by(seen.evidence)
+    seen = replace(seen, evidence=seen.evidence + apart(keyframe, part, seen.nats, parameters.partition))
+    motion = motions_of_parts(part, seen.nats, parameters.partition)
+    found_before = np.bincount(part, keyframe.area * (belief.body > 0), len(motion))
+    moved = (motion > 0) | (2 * found_before > np.bincount(part, keyframe.area, len(motion)))
+    previous = [belief.body] if before is None else [belief.body, before.body]
+    # What was found in motion and is gone leaves no gap in the numbers.
+    next_id = max(belief.next_id, 0 if before is None else int(before.body.max(initial=0)) + 1)
+    body, next_id = with_ids(part, moved, keyframe.area, previous, next_id)
+    return seen, Bodies(body, motion[part], seen.motions_K, next_id)
+
+
+def carry_bodies(
+    belief: Belief, bodies: Bodies, frame: Frame, above: AboveTable, remembered: NDArray[np.uint16]
+) -> NDArray[np.uint16]:
+    """[H, W], ids in the view of a frame, UNKNOWN where something stands that has not moved, 0 elsewhere.
+
+    `remembered` [H, W] has ids where things that the keyframe does not see should be now.
+    """
+    # One label for each body and motion, then one for each remembered id.
+    motions = len(bodies.motions_K)
+    code, label = np.unique(bodies.body * motions + bodies.motion, return_inverse=True)
+    rigid = np.stack(np.divmod(code, motions))
+    hiding = remembered > 0
+    hidden, order = np.unique(remembered[hiding], return_inverse=True)
+    number = np.zeros_like(remembered)
+    number[hiding] = order + 1 + len(code)
+    id_of = np.full(65536, UNKNOWN)
+    ids = np.concatenate([[0], np.where(rigid[0] > 0, rigid[0], UNKNOWN), hidden])
+    id_of[: len(ids)] = ids
+    moves = {i + 1: bodies.motions_K[g] for i, g in enumerate(rigid[1]) if g > 0}
+    found = id_of.take(carry_superpixels(belief, label + 1, moves, frame, above, number))
+    blind = (frame.depth == 0) & ~frame.robot & ~above.mask
+    if np.count_nonzero(blind) < _BLIND * frame.depth.size:
+        return found
+    # Too near for the camera to measure: the depth that the keyframe has, moved, must do.
+    image = belief.keyframe.image_of((label + 1).astype(np.uint16))
+    drawn, _ = draw_labels(belief.keyframe.frame, frame, image, moves)
+    blind = np.flatnonzero(blind & (drawn > 0))
+    found.ravel()[blind] = id_of.take(drawn.ravel().take(blind))
+    return found
+
+
+def carry_superpixels(
+    belief: Belief,
+    label: NDArray[np.intp],
+    moves: Mapping[int, NDArray[np.float64]],
+    frame: Frame,
+    above: AboveTable,
+    remembered: NDArray[np.integer],
+) -> NDArray[np.uint16]:
+    """Labels > 0 of superpixels [N], of which some moved by motions [4, 4], in the view of a frame [H, W]."""
+    keyframe = belief.keyframe
+    pair, label_0 = FramePair(keyframe.frame, frame), keyframe.image_of(label.astype(np.uint16))
+    return carry_labels(pair, label_0, moves, above, remembered.astype(np.uint16))
+
+
+def rebased(then: Bodies, now: Bodies, old: Keyframe, following: Belief) -> Bodies:
+    """How bodies had moved `then`, since the keyframe of `now`, which follows the `old` one: backwards, mostly.
+
+    `then` and `now` are told since the old keyframe.
+    """
+    X_NO = inverse(following.keyframe.frame.X_WC) @ old.frame.X_WC
+    motions, motion = [np.eye(4)], np.zeros(following.keyframe.count, np.intp)
+    for a in np.unique(following.body[following.body > 0]):
+        mine = now.body == a
+        if not mine.any():
+            continue
+        k = np.bincount(then.motion[mine], old.area[mine]).argmax()
+        motion[following.body == a] = len(motions)
+        since = then.motions_K[k] @ inverse(now.motions_K[now.motion[mine][0]])
+        motions.append(seen_from(X_NO, since))
+    return Bodies(following.body, motion, np.array(motions), following.next_id)

@@ -1,0 +1,104 @@
+"""The bodies of a keyframe, by what one frame says of a few superpixels."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from riseg_drake.geometry.se3 import exp_se3, inverse, translation
+from riseg_drake.segmentation import bodies as module
+from riseg_drake.segmentation.belief import Belief, BeliefParameters
+from riseg_drake.segmentation.bodies import Bodies, bodies_of, rebased
+from riseg_drake.segmentation.observation import Observation, ObservationParameters
+
+
+def test_how_bodies_had_moved_when_the_reference_was_taken_is_told_since_the_new_keyframe():
+    X_WO, X_WN = (
+        exp_se3(np.array([0.1, 0.2, 0.0, 0.0, 0.0, 0.6])),
+        exp_se3(np.array([0.0, -0.1, 0.3, 0.1, 0.0, 0.5])),
+    )
+    rng = np.random.default_rng(0)
+    # Poses in W of two bodies, of which the second stood still, at the old keyframe, then, and at the new one.
+    X_WB = [exp_se3(0.1 * rng.normal(size=6)) for _ in range(3)]
+    since_old = [inverse(X_WO) @ X @ inverse(X_WB[0]) @ X_WO for X in X_WB]
+    body = np.array([4, 4, 7])
+    then = Bodies(body, np.array([1, 1, 0]), np.array([np.eye(4), since_old[1]]), 8)
+    now = Bodies(body, np.array([1, 1, 0]), np.array([np.eye(4), since_old[2]]), 8)
+    old = SimpleNamespace(frame=SimpleNamespace(X_WC=X_WO), area=np.array([5, 5, 5]))
+    new = SimpleNamespace(frame=SimpleNamespace(X_WC=X_WN), count=4)
+    following = SimpleNamespace(keyframe=new, body=np.array([7, 4, 0, 4]), next_id=8)
+    told = rebased(then, now, old, following)
+    expected = inverse(X_WN) @ X_WB[1] @ inverse(X_WB[2]) @ X_WN  # from the new keyframe back to then
+    for superpixel, motion in enumerate([np.eye(4), expected, np.eye(4), expected]):
+        np.testing.assert_allclose(told.motions_K[told.motion[superpixel]], motion, atol=1e-12)
+    at_the_keyframe = rebased(now, now, old, following)
+    for X in at_the_keyframe.motions_K:
+        np.testing.assert_allclose(X, np.eye(4), atol=1e-12)
+
+
+STILL_AND_MOVED = np.array([np.eye(4), translation(np.array([0.02, 0, 0]))])
+
+
+def a_row_of_four(body, next_id=3, across=(False, False, False), area=(100, 100, 100, 100)):
+    """A belief of four superpixels in a row, of which the first two move and the others stand still."""
+    keyframe = SimpleNamespace(
+        count=4,
+        borders=np.array([[0, 1], [1, 2], [2, 3]]),
+        length=np.array([10.0, 20.0, 10.0]),
+        area=np.array(area),
+        across=np.array(across),
+        pixels_per_metre=1.0,
+    )
+    belief = Belief(
+        keyframe=keyframe,
+        prior=np.array([2.0, -1, 2]),
+        evidence=np.zeros(3),
+        alike=np.zeros(3),
+        body=np.array(body),
+        next_id=next_id,
+        part=np.arange(4),
+        shown=np.full(3, 3.0),
+        finer=np.zeros((0, 4), int),
+    )
+    nats = np.array([[50.0, 50, 0, 0], [0, 0, 50, 50]])
+    said = np.array([0.1, -0.2, 0.3])
+    seen = Observation(STILL_AND_MOVED, np.array([1, 1, 0, 0]), nats, said, np.ones(4), np.full(2, 0.5))
+    return belief, seen
+
+
+def told(belief, seen, before=None):
+    return bodies_of(belief, seen, before, BeliefParameters(), ObservationParameters())
+
+
+def test_what_has_no_one_motion_speaks_against_the_border_between_its_parts_by_its_length():
+    seen, bodies = told(*a_row_of_four([0, 0, 0, 0]))
+    # One motion costs both parts 100 nats, of which 60 are free: 40 over 20 pixels of border.
+    np.testing.assert_allclose(seen.evidence, [0.1, -0.2 - 2.0, 0.3])
+    assert (bodies.motion.tolist(), bodies.body.tolist(), bodies.next_id) == ([1, 1, 0, 0], [3, 3, 0, 0], 4)
+    np.testing.assert_array_equal(bodies.motions_K, STILL_AND_MOVED)
+
+
+@pytest.mark.parametrize(("area", "kept"), [((100, 100, 101, 99), 1), ((100, 100, 100, 100), 0)])
+def test_what_has_moved_before_by_more_than_half_of_its_area_is_a_body_though_it_stands_still(area, kept):
+    _, bodies = told(*a_row_of_four([0, 0, 1, 0], area=area))
+    assert bodies.body.tolist() == [3, 3, kept, kept]
+
+
+@pytest.mark.parametrize(
+    ("before", "next_id", "ids", "following"),
+    [
+        ([5, 5, 0, 0], 3, [5, 5, 0, 0], 6),  # it is what it was in the frame before
+        ([0, 0, 0, 7], 3, [8, 8, 0, 0], 9),  # 7 is gone, and nobody else's
+        ([0, 0, 0, 7], 9, [9, 9, 0, 0], 10),
+    ],
+)
+def test_ids_are_those_of_the_frame_before_and_new_ones_nobodys(before, next_id, ids, following):
+    before = Bodies(np.array(before), np.zeros(4, int), STILL_AND_MOVED, 99)
+    _, bodies = told(*a_row_of_four([0, 0, 0, 0], next_id), before)
+    assert (bodies.body.tolist(), bodies.next_id) == (ids, following)
+
+
+def test_across_a_gap_all_of_both_parts_says_what_they_are_and_elsewhere_each_superpixel(monkeypatch):
+    monkeypatch.setattr(module, "evidence_of_parts", lambda *_: np.array([9.0, -3.0, 9.0]))
+    seen, _ = told(*a_row_of_four([0, 0, 0, 0], across=(False, True, False)))
+    np.testing.assert_allclose(seen.evidence, [0.1, -3.0 - 2.0, 0.3])
