@@ -1,4 +1,4 @@
-"""Collision shapes as the corners of their convex hulls."""
+"""Shapes as the corners of their convex hulls."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,6 @@ def shape_corners(shape: Shape) -> NDArray:
             hull = shape.GetConvexHull()
             return np.array([hull.vertex(i) for i in range(hull.num_vertices())])
         case HalfSpace():
-            raise ValueError("a half space as collision geometry has no extent; a box or a mesh would do")
+            raise ValueError("a half space has no extent; a box or a mesh would do")
         case _:
-            raise ValueError(f"collision geometry of type {type(shape).__name__} is not supported")
+            raise ValueError(f"a shape of type {type(shape).__name__} is not supported")

@@ -6,12 +6,13 @@ from typing import Protocol
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import Box, Capsule, Convex, Cylinder, Mesh, Role, SceneGraphInspector, Shape, Sphere
+from pydrake.geometry import Role, SceneGraphInspector, Shape
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, ModelInstanceIndex, RigidBody
 from scipy.spatial import ConvexHull
 
 from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.robot.shape_corners import shape_corners
 
 NEAR = 0.01
 """What is nearer to the camera's centre than this is not drawn, m."""
@@ -152,40 +153,18 @@ def _grown(points: NDArray, margin: float) -> tuple[NDArray[np.float64], NDArray
 
 
 def hull_corners(shape: Shape) -> NDArray[np.float64]:
-    """Points [N, 3], m, whose convex hull is a shape's, round ones taken as slightly larger polyhedra.
+    """Points [N, 3], m, whose convex hull is a shape's, or very nearly.
 
     Something flat, as a sticker is, becomes a millimetre thick. Raises UnknownShapeError.
     """
-    return _with_volume(_corners(shape))
-
-
-def _corners(shape: Shape) -> NDArray[np.float64]:
-    if isinstance(shape, Mesh | Convex):
-        try:
-            hull = shape.GetConvexHull()
-        except (RuntimeError, ValueError) as error:
-            reason = " ".join(str(error).split())
-            raise UnknownShapeError(
-                f"a mesh cannot be read, it should be .obj, .gltf or .vtk ({reason})"
-            ) from None
-        return np.array([hull.vertex(i) for i in range(hull.num_vertices())])
-    if isinstance(shape, Box):
-        signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
-        return signs * np.array(shape.size()) / 2
-    angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)
-    circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(24)], axis=-1) / np.cos(np.pi / 24)
-    up = np.array([0, 0, 1.0])
-    if isinstance(shape, Cylinder):
-        return np.concatenate([shape.radius() * circle + s * shape.length() / 2 * up for s in (-1, 1)])
-    if isinstance(shape, Sphere | Capsule):
-        half = shape.length() / 2 if isinstance(shape, Capsule) else 0.0
-        tilts = np.linspace(-np.pi / 2, np.pi / 2, 13)
-        return (
-            shape.radius()
-            * np.concatenate([circle * np.cos(t) + np.sin(t) / np.cos(np.pi / 24) * up for t in tilts])
-            + np.repeat(np.where(tilts < 0, -half, half), 24)[:, None] * up
-        )
-    raise UnknownShapeError(f"the robot's description has a visual {shape}; known are meshes and primitives")
+    try:
+        corners = shape_corners(shape)
+    except (RuntimeError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise UnknownShapeError(
+            f"a visual of the robot cannot be read; a mesh should be .obj, .gltf or .vtk ({reason})"
+        ) from None
+    return _with_volume(corners)
 
 
 def _with_volume(points: NDArray[np.float64]) -> NDArray[np.float64]:
