@@ -105,18 +105,18 @@ def hardware_command(request: HardwareRequest, console: Console) -> None:
                 with console.status("waiting for arm and camera") as status:
                     wait_for_drivers(reception, config, ready=not dry_run, say=status.update)
                 session = _Session(
-                    scenario,
-                    seed,
-                    folder,
-                    progress,
-                    steps,
-                    reception,
-                    truth_source,
-                    operator,
-                    console,
-                    browser,
-                    exports,
-                    timeline,
+                    scenario=scenario,
+                    seed=seed,
+                    folder=folder,
+                    progress=progress,
+                    steps=steps,
+                    reception=reception,
+                    truth=truth_source,
+                    operator=operator,
+                    console=console,
+                    meshcat=browser,
+                    exports=exports,
+                    timeline=timeline,
                 )
                 if dry_run:
                     session.run_dry(request.yes, request.replayed)
@@ -133,30 +133,27 @@ def hardware_command(request: HardwareRequest, console: Console) -> None:
         stay(browser, folder.path / REPLAY, console, request.wait, operator.wait_for_enter)
 
 
+@dataclass(kw_only=True)
 class _Session:
     """One run with everything that it needs."""
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        seed: int,
-        folder: RunFolder,
-        progress: Progress,
-        steps: list[Step],
-        reception: Reception,
-        truth: TruthSource,
-        operator: TerminalOperator,
-        console: Console,
-        meshcat: Meshcat | None,
-        exports: Exports,
-        timeline: Timeline,
-    ):
-        self._scenario, self._seed, self._folder = scenario, seed, folder
-        self._reception, self._truth, self._operator = reception, truth, operator
-        self._console, self._meshcat, self._exports, self._timeline = console, meshcat, exports, timeline
-        self._config = scenario.hardware
-        self._progress, self._steps = progress, steps
-        self._planned = None if meshcat is None else PlannedMotion(scenario, meshcat, reception.clock)
+    scenario: Scenario
+    seed: int
+    folder: RunFolder
+    progress: Progress
+    steps: list[Step]
+    reception: Reception
+    truth: TruthSource
+    operator: TerminalOperator
+    console: Console
+    meshcat: Meshcat | None
+    exports: Exports
+    timeline: Timeline
+
+    def __post_init__(self) -> None:
+        self._config = self.scenario.hardware
+        clock = self.reception.clock
+        self._planned = None if self.meshcat is None else PlannedMotion(self.scenario, self.meshcat, clock)
         self._heard = (0, time.monotonic())
         self._stopped = False
 
@@ -169,40 +166,38 @@ class _Session:
                 CommandProcess(self._config.lcm, self._config.command, self._config.panda)
             )
             self._go_to(q_observe, kinematics, commands)
-            way_back = WayBack(kinematics, q_observe, planned_limits(self._scenario), commands)
+            way_back = WayBack(kinematics, q_observe, planned_limits(self.scenario), commands)
             wired = make_diagram(
-                self._scenario,
-                self._seed,
-                self._meshcat,
-                drivers=Drivers(self._reception, commands, way_back.take),
+                self.scenario,
+                self.seed,
+                self.meshcat,
+                drivers=Drivers(self.reception, commands, way_back.take),
                 permit=self._permit,
             )
             listeners: list[Listener] = []
             if record:
                 recording = recording_of(
-                    wired, self._scenario, self._seed, self._truth, self._folder.path / RECORDING
+                    wired, self.scenario, self.seed, self.truth, self.folder.path / RECORDING
                 )
                 listeners.append(stack.enter_context(recording))
             off_path = self._config.command.safety.off_path
-            watch = ArmWatch(
-                wired, commands, self._reception, self._operator, self._progress, way_back, off_path
-            )
+            watch = ArmWatch(wired, commands, self.reception, self.operator, self.progress, way_back, off_path)
             try:
                 self._interact(wired, lambda context: watch(context) or self._is_silent(PATIENCE), listeners)
             finally:
-                self._folder.note(
+                self.folder.note(
                     pauses=watch.pauses,
-                    messages_left_out={"seen": self._reception.left_out, "commanding": commands.left_out},
+                    messages_left_out={"seen": self.reception.left_out, "commanding": commands.left_out},
                 )
             if self._stopped:
-                raise RunStoppedError(self._progress.end)
+                raise RunStoppedError(self.progress.end)
         self._note_gaps(commands)
 
     def _note_gaps(self, commands: CommandProcess) -> None:
         """How evenly commands were sent; known once they have ended."""
         if len(commands.send_times) > 1:
             gaps = np.diff(commands.send_times)
-            self._folder.note(
+            self.folder.note(
                 commands=len(commands.send_times),
                 command_gap_ms={
                     "median": round(1e3 * float(np.median(gaps)), 3),
@@ -213,55 +208,55 @@ class _Session:
 
     def run_dry(self, unasked: bool, replayed: bool) -> None:
         """Show what would be done from where the arm is, and move nothing."""
-        assert self._reception.status is not None
+        assert self.reception.status is not None
         # Where the arm stands it looks from.
-        self._config.start_position = [float(q) for q in self._reception.status.position]
-        operator = None if unasked else self._operator
-        showing = DryRun(self._scenario, self._planned, operator, self._console, self._progress)
+        self._config.start_position = [float(q) for q in self.reception.status.position]
+        operator = None if unasked else self.operator
+        showing = DryRun(self.scenario, self._planned, operator, self.console, self.progress)
         wired = make_diagram(
-            self._scenario,
-            self._seed,
-            self._meshcat,
-            drivers=Drivers(self._reception),
+            self.scenario,
+            self.seed,
+            self.meshcat,
+            drivers=Drivers(self.reception),
             permit=(lambda push: Permission.WAIT) if replayed else showing.permit,
         )
         self._interact(wired, lambda _: self._is_silent(SILENCE if replayed else PATIENCE), [])
         if self._stopped and not replayed:
-            raise RunStoppedError(self._progress.end)
+            raise RunStoppedError(self.progress.end)
 
     def _interact(
         self, wired: WiredDiagram, look: Callable[[Context], bool], listeners: list[Listener]
     ) -> None:
         with ExitStack() as stack:
-            status = stack.enter_context(self._console.status("looking"))
-            narrator, clock = Narrator(self._console, status), StageClock()
+            status = stack.enter_context(self.console.status("looking"))
+            narrator, clock = Narrator(self.console, status), StageClock()
             robot = PandaKinematics(self._config.panda, self._config.camera.fixed_pose)
-            log = stack.enter_context(self._timeline.opened(self._folder.path.name, robot))
+            log = stack.enter_context(self.timeline.opened(self.folder.path.name, robot))
             listeners = [
-                lambda *_: narrator.follow(self._progress),
+                lambda *_: narrator.follow(self.progress),
                 *listeners,
-                export_listener(wired, self._exports),
+                export_listener(wired, self.exports),
                 timeline_listener(wired, log, clock),
             ]
-            wall = WallClock(self._reception.clock(), lambda context: self._look(look, context))
-            if self._meshcat is not None:
-                kept = stack.enter_context(replay(self._meshcat, self._folder.path / REPLAY, wall.start))
-                listeners.append(lambda frame, _: kept.mark(self._progress.interaction_step, frame.time))
+            wall = WallClock(self.reception.clock(), lambda context: self._look(look, context))
+            if self.meshcat is not None:
+                kept = stack.enter_context(replay(self.meshcat, self.folder.path / REPLAY, wall.start))
+                listeners.append(lambda frame, _: kept.mark(self.progress.interaction_step, frame.time))
             for step in interactions(
                 wired,
                 clock,
-                self._progress,
-                self._scenario.longest,
+                self.progress,
+                self.scenario.longest,
                 tuple(listeners),
-                truth=self._truth,
+                truth=self.truth,
                 wall=wall,
             ):
-                self._folder.write_step(step)
-                self._steps.append(step)
+                self.folder.write_step(step)
+                self.steps.append(step)
                 narrator.tell_step(step)
                 if log is not None:
                     log.take_scores(step.time, percent(step.scores))
-        narrator.tell_end(self._progress)
+        narrator.tell_end(self.progress)
 
     def _observation_posture(self, kinematics: PandaKinematics) -> np.ndarray:
         config = self._config
@@ -273,42 +268,42 @@ class _Session:
             raise ScenarioError(str(error)) from None
 
     def _go_to(self, q: np.ndarray, kinematics: PandaKinematics, commands: CommandProcess) -> None:
-        assert self._reception.status is not None
-        here = self._reception.status.position
+        assert self.reception.status is not None
+        here = self.reception.status.position
         if np.abs(here - q).max() < ARRIVED / 2:
             return
 
         def plan(q_from: np.ndarray) -> PiecewisePolynomial:
-            return straight_motion(kinematics, q_from, q, planned_limits(self._scenario))
+            return straight_motion(kinematics, q_from, q, planned_limits(self.scenario))
 
         turn = np.degrees(np.abs(q - here).max())
-        self._operator.confirm(
+        self.operator.confirm(
             f"the arm goes to where it looks from, {turn:.0f} degrees in {plan(here).end_time():.1f} s"
         )
-        travel(plan, commands, self._reception, self._operator)
+        travel(plan, commands, self.reception, self.operator)
 
     def _permit(self, push: Push) -> Permission:
-        said = self._operator.permit(push)
+        said = self.operator.permit(push)
         if self._planned is not None:
             self._planned.show(push) if said is Permission.WAIT else self._planned.hide()
         if said is Permission.END:
-            self._progress.end = self._operator.why_quit
+            self.progress.end = self.operator.why_quit
         return said
 
     def _look(self, look: Callable[[Context], bool], context: Context) -> bool:
         """Whether something from outside has brought the run to its end."""
-        for line in self._reception.untold():
-            self._operator.tell(line)
-        was_over = bool(self._progress.end)  # by the operator's word, say
+        for line in self.reception.untold():
+            self.operator.tell(line)
+        was_over = bool(self.progress.end)  # by the operator's word, say
         self._stopped = look(context) and not was_over
         return self._stopped or was_over
 
     def _is_silent(self, patience: float) -> bool:
         """Whether the camera has said nothing for `patience`, s."""
         pictures, since = self._heard
-        if self._reception.pictures != pictures:
-            self._heard = (self._reception.pictures, time.monotonic())
+        if self.reception.pictures != pictures:
+            self._heard = (self.reception.pictures, time.monotonic())
         elif time.monotonic() - since > patience:
-            self._progress.end = f"no picture has come for {patience:g} s"
+            self.progress.end = f"no picture has come for {patience:g} s"
             return True
         return False
