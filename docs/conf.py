@@ -2,8 +2,10 @@
 
 import re
 from inspect import isfunction
+from pathlib import Path
 from typing import Any
 
+import nbformat
 from sphinx.application import Sphinx
 from sphinx.ext.napoleon import Config, GoogleDocstring
 
@@ -12,7 +14,7 @@ author = "the riseg_drake developers"
 html_title = "riseg_drake"
 
 extensions = [
-    "myst_parser",  # the pages are Markdown, and read the same on a code host
+    "myst_nb",  # the pages are Markdown, and read the same on a code host; notebooks are pages, too
     "sphinx.ext.apidoc",  # a page of docstrings for every room
     "sphinx.ext.autodoc",
 ]
@@ -23,6 +25,10 @@ html_show_copyright = False
 
 # Links to headings, such as systems.md#pushplanner, work as they do on a code host.
 myst_heading_anchors = 3
+
+# Notebooks hold what they made when they were executed last; tests/test_notebooks.py executes them anew.
+nb_execution_mode = "off"
+NOTEBOOKS = Path(__file__).parent.parent / "notebooks"
 
 apidoc_modules = [
     {
@@ -68,8 +74,22 @@ def is_made_elsewhere(app: Sphinx, what: str, name: str, thing: Any, skip: bool,
     return True if isfunction(thing) and not thing.__module__.startswith(project) else None
 
 
+def with_notebooks(app: Sphinx) -> None:
+    """Lay the notebooks among the pages, each with the file itself to take along."""
+    folder = Path(app.srcdir) / NOTEBOOKS.name
+    folder.mkdir(exist_ok=True)
+    for path in NOTEBOOKS.glob("*.ipynb"):
+        notebook = nbformat.read(path, as_version=4)
+        link = nbformat.v4.new_markdown_cell(
+            f"{{download}}`{path.name} <../../notebooks/{path.name}>`, to open in Jupyter."
+        )
+        notebook.cells.insert(1, link)
+        nbformat.write(notebook, folder / path.name)
+
+
 def setup(app: Sphinx) -> None:
     """Called by Sphinx."""
+    app.connect("builder-inited", with_notebooks)
     app.connect("autodoc-process-docstring", as_restructured_text)
     app.connect("autodoc-process-signature", with_short_arrays)
     app.connect("autodoc-skip-member", is_made_elsewhere)
