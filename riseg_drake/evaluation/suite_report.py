@@ -53,8 +53,46 @@ class KindResult:
         return dict(Counter(reasons).most_common())
 
 
+@dataclass(frozen=True)
+class FigureTable:
+    """Figures in words, of each kind or of each scene."""
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
 def suite_text(kinds: Sequence[KindResult], about: Mapping[str, object]) -> str:
     """The whole report; `about` are its settings, by name."""
+
+    def linked(table: FigureTable, places: Sequence[str]) -> str:
+        rows = [[f"[{row[0]}]({place})", *row[1:]] for row, place in zip(table.rows, places, strict=True)]
+        return markdown_table(table.head, rows)
+
+    pictures = [
+        f"{kind.folder}/{scene.name}/step_{scene.interactions}/overlay.png"
+        for kind in kinds
+        for scene in kind.scenes
+    ]
+    moved = moved_table(kinds)
+    return "\n".join(
+        [
+            "# A suite of scenes\n",
+            "".join(f"- {name}: {value}\n" for name, value in about.items()),
+            linked(kinds_table(kinds), [f"{kind.folder}/report.md" for kind in kinds]),
+            "In percent, after the last interaction, means over the scenes of a kind. The baselines move\n"
+            "nothing: their Overlap F on the picture before the first interaction, and after the last.\n",
+            "## In motion, and what was moved\n",
+            markdown_table(moved.head, moved.rows),
+            f"Overlap F, in percent, of what has moved by {100 * MOVED:g} cm or more, in every frame from\n"
+            "then on until the camera observes again, and of the same at rest after it.\n",
+            "## The scenes\n",
+            linked(scenes_table(kinds), pictures),
+        ]
+    )
+
+
+def kinds_table(kinds: Sequence[KindResult]) -> FigureTable:
+    """The scores of each kind beside the baselines', in percent, and how its scenes ended."""
     baselines = list(dict.fromkeys(name for kind in kinds for scene in kind.scenes for name in scene.baselines))
     head = ["kind", "scenes", "interactions", "Overlap F", "Boundary F", "found %"]
     head += [f"{name}, {when}" for name in baselines for when in ("untouched", "last")] + ["ended"]
@@ -64,7 +102,7 @@ def suite_text(kinds: Sequence[KindResult], about: Mapping[str, object]) -> str:
         of_baselines = [percent(kind.mean(name, step).overlap_f) for name in baselines for step in (0, -1)]
         rows.append(
             [
-                f"[{kind.name}]({kind.folder}/report.md)",
+                kind.name,
                 str(len(kind.scenes)),
                 f"{kind.interactions:.1f} of {kind.last_step}",
                 percent(last.overlap_f),
@@ -74,21 +112,7 @@ def suite_text(kinds: Sequence[KindResult], about: Mapping[str, object]) -> str:
                 "; ".join(f"{number} {reason}" for reason, number in kind.endings.items()),
             ]
         )
-    return "\n".join(
-        [
-            "# A suite of scenes\n",
-            "".join(f"- {name}: {value}\n" for name, value in about.items()),
-            markdown_table(head, rows),
-            "In percent, after the last interaction, means over the scenes of a kind. The baselines move\n"
-            "nothing: their Overlap F on the picture before the first interaction, and after the last.\n",
-            "## In motion, and what was moved\n",
-            _moved(kinds),
-            f"Overlap F, in percent, of what has moved by {100 * MOVED:g} cm or more, in every frame from\n"
-            "then on until the camera observes again, and of the same at rest after it.\n",
-            "## The scenes\n",
-            _scenes(kinds),
-        ]
-    )
+    return FigureTable(head, rows)
 
 
 def suite_figures(kinds: Sequence[KindResult]) -> dict[str, Any]:
@@ -111,26 +135,26 @@ def suite_figures(kinds: Sequence[KindResult]) -> dict[str, Any]:
     }
 
 
-def _moved(kinds: Sequence[KindResult]) -> str:
+def moved_table(kinds: Sequence[KindResult]) -> FigureTable:
+    """Overlap F in motion and at rest after it, in percent, and by how much things were moved."""
     rows = []
     for kind in kinds:
         moved, disturbed = kind.in_motion, kind.disturbance
         in_motion = ["–", "–"] if moved is None else [percent(moved.overlap_f), percent(moved.at_rest_f)]
         rows.append([kind.name, *in_motion, *disturbance_cells(disturbed)])
-    return markdown_table(("kind", "in motion", "at rest after it", *DISTURBANCE_HEAD), rows)
+    return FigureTable(("kind", "in motion", "at rest after it", *DISTURBANCE_HEAD), rows)
 
 
-def _scenes(kinds: Sequence[KindResult]) -> str:
+def scenes_table(kinds: Sequence[KindResult]) -> FigureTable:
+    """Every scene's scores in percent, and how it ended."""
     rows = []
     for kind in kinds:
         for scene in kind.scenes:
-            picture = f"[{kind.name}]({kind.folder}/{scene.name}/step_{scene.interactions}/overlay.png)"
             last = scene.scores[-1] if scene.scores else None
             figures = ["–"] * 3
             if last is not None:
                 found = f"{last.objects_found:g} of {last.objects_true:g}"
                 figures = [percent(last.overlap_f), percent(last.boundary_f), found]
-            rows.append(
-                [picture, str(scene.seed), str(scene.interactions), *figures, scene.failure or scene.end]
-            )
-    return markdown_table(("kind", "seed", "interactions", "Overlap F", "Boundary F", "found", "end"), rows)
+            about = [kind.name, str(scene.seed), str(scene.interactions)]
+            rows.append([*about, *figures, scene.failure or scene.end])
+    return FigureTable(("kind", "seed", "interactions", "Overlap F", "Boundary F", "found", "end"), rows)

@@ -27,9 +27,9 @@ def evaluation_page(
     views: list[View] = []
     moments: list[Moment] = []
     for result in scored[:MOST_VIEWS]:
-        seen = _last_view(result, folders[result.name])
+        seen = last_view(result, folders[result.name])
         if seen is not None:
-            moments.append(Moment(f"{result.name}, seed {result.seed}", [_end(result)], [len(views)]))
+            moments.append(Moment(f"{result.name}, seed {result.seed}", [end_of(result)], [len(views)]))
             views.append(seen)
     methods = scores_by_method(results)
     means = [(method, step_means(scores, last_step)[-1]) for method, scores in methods.items()]
@@ -56,13 +56,14 @@ def evaluation_page(
     )
 
 
-def _end(result: SceneResult) -> str:
+def end_of(result: SceneResult) -> str:
+    """How a scene ended, in a sentence."""
     last = result.scores[-1]
     pushes = f"{result.interactions} interaction{'' if result.interactions == 1 else 's'}"
     return f"Overlap F {100 * last.overlap_f:.1f} % after {pushes}; {result.end}."
 
 
-def _last_view(result: SceneResult, folder: Path) -> View | None:
+def last_view(result: SceneResult, folder: Path) -> View | None:
     """The picture after the last interaction, with masks and truth."""
     step = folder / f"step_{len(result.scores) - 1}"
     try:

@@ -5,6 +5,7 @@ kind "spread". The built-in suites are in `riseg_drake/diagrams/suites`.
 
 out/suite_clutter_seed_100/
     report.md  summary.json      a row a kind
+    report.html                  the same, with the worst scene of each, in one page to send round
     1_spread/                    report.md  figure.png  scene_000/ ... as `riseg evaluate` leaves them
 """
 
@@ -24,6 +25,7 @@ from riseg_drake.app.evaluate.progress import EvaluationProgress
 from riseg_drake.app.evaluate.scene_folder import SceneTask, digest, is_finished, read_result
 from riseg_drake.app.evaluate.scene_pool import Pool, pool_for
 from riseg_drake.app.evaluate.scene_work import SceneOutcome
+from riseg_drake.app.evaluate.suite_page import suite_page
 from riseg_drake.app.output_folder import OutputFolder
 from riseg_drake.app.report_page import REPORT as PAGE
 from riseg_drake.app.scenario import Scenario, load_scenario
@@ -138,6 +140,7 @@ def evaluate_suite(
         with folder.writing():
             results = [_of_kind(kind, group, outcomes, settings) for kind, group in tasks.items()]
             write_text(path / REPORT, suite_text(results, settings))
+            write_text(path / PAGE, suite_page(results, path, settings))
         folder.note(state="done", kinds=suite_figures(results))
     return results
 
@@ -180,7 +183,7 @@ def _claimed(folder: Path, tasks: Mapping[Kind, Sequence[SceneTask]], overwrite:
         "riseg_drake": version("riseg-drake"),
         "state": "running",
     }
-    parts = "|".join(map(re.escape, [REPORT, *kinds]))
+    parts = "|".join(map(re.escape, [REPORT, PAGE, *kinds]))
 
     def goes_on(earlier: Mapping[str, Any]) -> str:
         return "" if earlier.get("suite") == settings else "no earlier run of this suite with this seed"

@@ -84,6 +84,7 @@ def test_the_table_has_a_row_a_kind_beside_the_baselines_on_first_and_last_pictu
     assert list(content["kinds"]) == ["1_early_bird", "2_late"]
     assert content["kinds"]["2_late"]["in_motion"]["overlap_f"] == pytest.approx(0.6)
     assert (output / "2_late" / "report.md").exists(), "each kind has its whole report, too"
+    assert "<h1>A suite of 4 scenes of 2 kinds</h1>" in (output / "report.html").read_text()
 
 
 def test_an_interrupted_suite_goes_on_where_it_stopped(suite, tmp_path, runs):

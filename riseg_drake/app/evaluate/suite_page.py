@@ -1,0 +1,55 @@
+"""`report.html` of a suite: the worst scene of every kind, and all figures."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from riseg_drake.app.evaluate.page import end_of, last_view
+from riseg_drake.app.report_page import Moment, Report, Table, View, report_html, told_facts
+from riseg_drake.evaluation.suite_report import FigureTable, KindResult, kinds_table, moved_table, scenes_table
+
+
+def suite_page(kinds: Sequence[KindResult], folder: Path, about: Mapping[str, object]) -> str:
+    """The page, as HTML, of the suite in a folder; `about` are its settings, by name.
+
+    A kind none of whose pictures can be read is shown without.
+    """
+    views: list[View] = []
+    moments: list[Moment] = []
+    for kind in kinds:
+        scored = sorted((s for s in kind.scenes if s.scores), key=lambda scene: scene.scores[-1].overlap_f)
+        shown = ((scene, last_view(scene, folder / kind.folder / scene.name)) for scene in scored)
+        worst = next(((scene, seen) for scene, seen in shown if seen is not None), None)
+        if worst is not None:
+            scene, seen = worst
+            moments.append(Moment(f"{kind.name}: seed {scene.seed}", [end_of(scene)], [len(views)]))
+            views.append(seen)
+    count = sum(len(kind.scenes) for kind in kinds)
+    settings = [(name, str(value)) for name, value in about.items()]
+    return report_html(
+        Report(
+            title=f"A suite of {count} scenes of {len(kinds)} kinds",
+            facts=[*told_facts(), *settings],
+            ending="Of each kind the scene with the lowest Overlap F; the folder of each has a page with more.",
+            views=views,
+            moments=moments,
+            objects=None,
+            doubts=[
+                f"{kind.name}, {scene.name} (seed {scene.seed}) failed: {scene.failure}"
+                for kind in kinds
+                for scene in kind.scenes
+                if scene.failure
+            ],
+            tables=[
+                _titled(
+                    "After the last interaction, in percent, and what one picture alone gives",
+                    kinds_table(kinds),
+                ),
+                _titled("In motion, in percent, and what was moved", moved_table(kinds)),
+                _titled("The scenes, in percent", scenes_table(kinds)),
+            ],
+        )
+    )
+
+
+def _titled(title: str, table: FigureTable) -> Table:
+    return Table(title, table.head, table.rows)
