@@ -32,15 +32,22 @@ def film_run(
     station = cast(SimulatedStation, wired.diagram.GetSubsystemByName("station"))
     onlooker = Onlooker(station, wired.intrinsics.width, wired.intrinsics.height)
     progress = Progress()
-    pictures = []
+    pictures: list[NDArray[np.uint8]] = []
+
+    def show(color: NDArray[np.uint8], mask: NDArray[np.uint16], context: Context) -> None:
+        seen = draw_masks(color, mask)
+        pictures.append(side_by_side(seen, onlooker.look(context), _captions(progress), WIDTH))
 
     def shoot(frame: Frame, context: Context) -> None:
         follow(progress)
         if frame.sequence % EVERY == 0:
-            seen = draw_masks(frame.color, wired.mask(context))
-            pictures.append(side_by_side(seen, onlooker.look(context), _captions(progress), WIDTH))
+            show(frame.color, wired.mask(context), context)
+        latest["context"] = context
 
+    latest: dict[str, Context] = {}
     steps = list(interactions(wired, StageClock(), progress, scenario.longest, (shoot,)))
+    # What was decided at the last rest, too.
+    show(steps[-1].color, steps[-1].mask, latest["context"])
     return pictures, steps
 
 
