@@ -20,6 +20,7 @@ from riseg_drake.app.hardware.drivers import PATIENCE, listening, wait_for_drive
 from riseg_drake.app.hardware.dry_run import DryRun
 from riseg_drake.app.hardware.planned_motion import PlannedMotion
 from riseg_drake.app.hardware.terminal_operator import TerminalOperator
+from riseg_drake.app.loop_request import LoopRequest
 from riseg_drake.app.meshcat_replay import replay, stay
 from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step
 from riseg_drake.app.planned_speed import check_limits, planned_limits
@@ -43,20 +44,9 @@ SILENCE = 5.0
 
 
 @dataclass(frozen=True)
-class HardwareRequest:
+class HardwareRequest(LoopRequest):
     """What is to be done with the real arm, or shown of what it would do."""
 
-    scenario: Path | None = None
-    """A file, or None for the built-in one."""
-    seed: int = 0
-    output: Path | None = None
-    """Folder (out/NAME_DATE)."""
-    record: bool = False
-    """Whether what the camera sees is recorded."""
-    meshcat: bool = False
-    """Whether it is shown in a browser; a dry run always is."""
-    wait: bool = True
-    """Whether the browser's view stays until Enter, once it is over."""
     dry_run: bool = False
     """Whether nothing moves."""
     yes: bool = False
@@ -65,12 +55,6 @@ class HardwareRequest:
     """Whether the emulator's true labels are heard."""
     replayed: bool = False
     """Whether a log is heard in place of drivers; then nothing moves."""
-    export: tuple[str, ...] = ()
-    """Formats of other tools."""
-    export_frames: tuple[int, ...] = ()
-    """Numbers of the frames for Contact-GraspNet, from 0; the last one if there are none."""
-    rerun: Path | None = None
-    """File of a time line for Rerun's viewer; an empty path: in the output folder."""
 
 
 def hardware_command(request: HardwareRequest, console: Console) -> None:

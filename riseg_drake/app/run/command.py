@@ -16,6 +16,7 @@ from rich.status import Status
 from riseg_drake.app.diagram import WiredDiagram, make_diagram
 from riseg_drake.app.exports import Exports, exporting
 from riseg_drake.app.graphics import require_graphics
+from riseg_drake.app.loop_request import LoopRequest
 from riseg_drake.app.meshcat_replay import replay, stay
 from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step
 from riseg_drake.app.report_page import REPORT
@@ -36,28 +37,11 @@ from riseg_drake.timeline.log import TimelineLog
 
 
 @dataclass(frozen=True)
-class RunRequest:
+class RunRequest(LoopRequest):
     """Which scene is to be run, and what is to be seen of it."""
 
-    scenario: Path | None = None
-    """A file, or None for the built-in one."""
-    seed: int = 0
-    output: Path | None = None
-    """Folder (out/NAME_seed_S)."""
-    record: bool = False
-    """Whether what the camera sees is recorded."""
-    meshcat: bool = False
-    """Whether it is shown in a browser."""
-    wait: bool = True
-    """Whether the browser's view stays until Enter, once it is over."""
     overwrite: bool = False
     """Whether an earlier run there is removed first."""
-    export: tuple[str, ...] = ()
-    """Formats of other tools."""
-    export_frames: tuple[int, ...] = ()
-    """Numbers of the frames for Contact-GraspNet, from 0; the last one if there are none."""
-    rerun: Path | None = None
-    """File of a time line for Rerun's viewer; an empty path: in the output folder."""
 
 
 def run_command(request: RunRequest, console: Console) -> None:
