@@ -4,7 +4,7 @@ import json
 import shutil
 from functools import cache, partial
 from pathlib import Path
-from tempfile import mkdtemp
+from tempfile import TemporaryDirectory
 
 import cv2
 import numpy as np
@@ -45,16 +45,18 @@ def _bag(place: Path, **kind: object) -> None:
 
 
 @cache
-def _bop_scene() -> Path:
-    """A scene as `--export bop` leaves it; made once."""
-    place = Path(mkdtemp(prefix="riseg_bop_"))
+def _bop_scene() -> TemporaryDirectory[str]:
+    """A scene as `--export bop` leaves it; made once, and gone with the program."""
+    folder = TemporaryDirectory(prefix="riseg_bop_")
+    place = Path(folder.name)
     write(place / "recording", _frames(), CAMERA)
     assert main(["segment", str(place / "recording"), "--output", str(place / "out"), "--export", "bop"]) == 0
-    return place / "out" / "export" / "bop" / "test" / "000000"
+    return folder
 
 
 def _bop(place: Path) -> None:
-    shutil.copytree(_bop_scene(), place / "source")
+    made = Path(_bop_scene().name) / "out" / "export" / "bop" / "test" / "000000"
+    shutil.copytree(made, place / "source")
 
 
 def _folder(place: Path) -> None:
