@@ -16,7 +16,7 @@ class LoopRequest:
     record: bool = False
     """Whether what the camera sees is recorded."""
     meshcat: bool = False
-    """Whether it is shown in a browser; a dry run always is."""
+    """Whether it is shown in a browser; a dry run of the real arm always is."""
     wait: bool = True
     """Whether the browser's view stays until Enter, once it is over."""
     export: tuple[str, ...] = ()

@@ -23,10 +23,9 @@ def evaluation_page(
 ) -> str:
     """The page, as HTML. A scene of which a picture cannot be read is shown without."""
     folders = {task.folder.name: task.folder for task in tasks}
-    scored = sorted((r for r in results if r.scores), key=lambda result: result.scores[-1].overlap_f)
     views: list[View] = []
     moments: list[Moment] = []
-    for result in scored[:MOST_VIEWS]:
+    for result in worst_first(results)[:MOST_VIEWS]:
         seen = last_view(result, folders[result.name])
         if seen is not None:
             moments.append(Moment(f"{result.name}, seed {result.seed}", [end_of(result)], [len(views)]))
@@ -54,6 +53,11 @@ def evaluation_page(
             ],
         )
     )
+
+
+def worst_first(results: Sequence[SceneResult]) -> list[SceneResult]:
+    """The scenes that have scores, those with the lowest Overlap F first."""
+    return sorted((r for r in results if r.scores), key=lambda result: result.scores[-1].overlap_f)
 
 
 def end_of(result: SceneResult) -> str:

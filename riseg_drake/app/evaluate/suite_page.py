@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from riseg_drake.app.evaluate.page import end_of, last_view
+from riseg_drake.app.evaluate.page import end_of, last_view, worst_first
 from riseg_drake.app.report_page import Moment, Report, Table, View, report_html, told_facts
-from riseg_drake.evaluation.suite_report import FigureTable, KindResult, kinds_table, moved_table, scenes_table
+from riseg_drake.evaluation.suite_report import KindResult, kinds_table, moved_table, scenes_table
 
 
 def suite_page(kinds: Sequence[KindResult], folder: Path, about: Mapping[str, object]) -> str:
@@ -16,15 +16,19 @@ def suite_page(kinds: Sequence[KindResult], folder: Path, about: Mapping[str, ob
     views: list[View] = []
     moments: list[Moment] = []
     for kind in kinds:
-        scored = sorted((s for s in kind.scenes if s.scores), key=lambda scene: scene.scores[-1].overlap_f)
-        shown = ((scene, last_view(scene, folder / kind.folder / scene.name)) for scene in scored)
-        worst = next(((scene, seen) for scene, seen in shown if seen is not None), None)
-        if worst is not None:
-            scene, seen = worst
-            moments.append(Moment(f"{kind.name}: seed {scene.seed}", [end_of(scene)], [len(views)]))
-            views.append(seen)
+        for scene in worst_first(kind.scenes):
+            seen = last_view(scene, folder / kind.folder / scene.name)
+            if seen is not None:
+                moments.append(Moment(f"{kind.name}: seed {scene.seed}", [end_of(scene)], [len(views)]))
+                views.append(seen)
+                break
     count = sum(len(kind.scenes) for kind in kinds)
     settings = [(name, str(value)) for name, value in about.items()]
+    tables = {
+        "After the last interaction, in percent, and what one picture alone gives": kinds_table(kinds),
+        "In motion, in percent, and what was moved": moved_table(kinds),
+        "The scenes, in percent": scenes_table(kinds),
+    }
     return report_html(
         Report(
             title=f"A suite of {count} scenes of {len(kinds)} kinds",
@@ -39,17 +43,6 @@ def suite_page(kinds: Sequence[KindResult], folder: Path, about: Mapping[str, ob
                 for scene in kind.scenes
                 if scene.failure
             ],
-            tables=[
-                _titled(
-                    "After the last interaction, in percent, and what one picture alone gives",
-                    kinds_table(kinds),
-                ),
-                _titled("In motion, in percent, and what was moved", moved_table(kinds)),
-                _titled("The scenes, in percent", scenes_table(kinds)),
-            ],
+            tables=[Table(title, table.head, table.rows) for title, table in tables.items()],
         )
     )
-
-
-def _titled(title: str, table: FigureTable) -> Table:
-    return Table(title, table.head, table.rows)

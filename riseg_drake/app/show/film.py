@@ -33,6 +33,7 @@ def film_run(
     onlooker = Onlooker(station, wired.intrinsics.width, wired.intrinsics.height)
     progress = Progress()
     pictures: list[NDArray[np.uint8]] = []
+    latest: list[Context] = []
 
     def show(color: NDArray[np.uint8], mask: NDArray[np.uint16], context: Context) -> None:
         seen = draw_masks(color, mask)
@@ -42,12 +43,11 @@ def film_run(
         follow(progress)
         if frame.sequence % EVERY == 0:
             show(frame.color, wired.mask(context), context)
-        latest["context"] = context
+        latest[:] = [context]
 
-    latest: dict[str, Context] = {}
     steps = list(interactions(wired, StageClock(), progress, scenario.longest, (shoot,)))
     # What was decided at the last rest, too.
-    show(steps[-1].color, steps[-1].mask, latest["context"])
+    show(steps[-1].color, steps[-1].mask, latest[0])
     return pictures, steps
 
 
