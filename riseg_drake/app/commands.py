@@ -139,6 +139,14 @@ def bench(chosen: argparse.Namespace, console: Console) -> None:
         from riseg_drake.app.bench.driver import bench_driver
 
         return bench_driver(console)
+    if chosen.sweep:
+        from riseg_drake.app.bench.sweep import sweep_command
+
+        return sweep_command(chosen.scenario, chosen.seed, chosen.json, console)
+    if chosen.run:
+        from riseg_drake.app.bench.whole_run import bench_run
+
+        return bench_run(chosen.scenario, chosen.seed, chosen.json, console)
     from riseg_drake.app.bench.command import bench_command
 
     bench_command(chosen.scenario, chosen.seed, chosen.stream, chosen.sam, chosen.json, console)

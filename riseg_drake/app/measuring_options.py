@@ -35,19 +35,26 @@ def add_bench_options(command: argparse.ArgumentParser) -> None:
         "--seed", type=seed_number, default=0, metavar="N", help="draws the scene and the noise (0)"
     )
     command.add_argument("--json", type=Path, metavar="FILE", help="also write all figures")
-    command.add_argument(
+    instead = command.add_mutually_exclusive_group()
+    instead.add_argument(
+        "--sweep", action="store_true", help="measure other sizes of image and numbers of objects instead"
+    )
+    instead.add_argument(
+        "--run", action="store_true", help="measure instead where the time of a whole simulated run goes"
+    )
+    instead.add_argument(
         "--stream",
         type=positive,
         metavar="SECONDS",
         help="measure instead how evenly commands for a real arm are sent beside the segmentation",
     )
-    command.add_argument(
+    instead.add_argument(
         "--stops", action="store_true", help="measure instead how soon a moving arm stands still, over LCM"
     )
-    command.add_argument(
+    instead.add_argument(
         "--driver", action="store_true", help="measure a cycle of `riseg drive-arm` instead, without an arm"
     )
-    command.add_argument("--raft", action="store_true", help="measure RAFT instead, small and large")
-    command.add_argument(
+    instead.add_argument("--raft", action="store_true", help="measure RAFT instead, small and large")
+    instead.add_argument(
         "--sam", action="store_true", help="measure Segment Anything instead, and the frames beside it"
     )

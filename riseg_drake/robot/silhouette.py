@@ -21,6 +21,8 @@ _FLAT = 1e-6
 """Share of a mesh's size, below which it has no volume."""
 _THIN = 5e-4
 """m; half of how thick it is taken for then."""
+_NEARLY_ONE = 0.1
+"""Faces that meet at a corner count as one in directions in which their normals differ by less than this."""
 _LARGEST = 1e6
 """m; corners farther away are none."""
 
@@ -145,10 +147,14 @@ def _grown(points: NDArray, margin: float) -> tuple[NDArray[np.float64], NDArray
     triangles = np.searchsorted(np.sort(hull.vertices), hull.simplices)
     triangles = np.argsort(hull.vertices)[triangles]
     edges = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
-    moved = np.empty_like(corners)
-    for i, corner in enumerate(corners):
-        normals = np.unique(hull.equations[(triangles == i).any(axis=1), :3].round(6), axis=0)
-        moved[i] = corner + np.linalg.lstsq(normals, np.full(len(normals), margin), rcond=0.1)[0]
+    # A corner moves to where all its faces go; of faces that are nearly one, as far as these say.
+    faces = np.column_stack([triangles.ravel(), np.repeat(hull.equations[:, :3], 3, axis=0).round(6)])
+    faces = np.unique(faces, axis=0)
+    corner, normal = faces[:, 0].astype(int), faces[:, 1:]
+    A, b = np.zeros((len(corners), 3, 3)), np.zeros((len(corners), 3))
+    np.add.at(A, corner, normal[:, :, None] * normal[:, None])
+    np.add.at(b, corner, margin * normal)
+    moved = corners + np.einsum("nij,nj->ni", np.linalg.pinv(A, rcond=_NEARLY_ONE**2, hermitian=True), b)
     return moved, np.unique(np.sort(edges, axis=1), axis=0)
 
 

@@ -14,6 +14,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import PackageMap, Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
+from scipy.spatial import ConvexHull, QhullError
 
 from riseg_drake.host.model_files import ModelFileError, reading_model
 from riseg_drake.host.terminal import one_line
@@ -147,10 +148,19 @@ def measure(name: str, path: Path) -> ObjectModel:
     except ValueError as error:
         raise SceneError(f"{path}: {error}") from error
     _check_size(path, body, corners)
+    corners = _outermost(corners)
     over_areas = any(touches_over_area(inspector, geometry) for geometry in geometries)
     centre = body.default_com()
     axes = axes_of_revolution(corners - centre, np.vstack([np.eye(3), _principal_axes(body)]))
     return ObjectModel(name, path, X_WB, outline, corners, over_areas, centre, axes)
+
+
+def _outermost(points: NDArray) -> NDArray:
+    """Those of some points [n, 3] that make their convex hull; all where that is flat."""
+    try:
+        return points[ConvexHull(points).vertices]
+    except QhullError:
+        return points
 
 
 def with_remedy(message: str) -> str:
