@@ -81,9 +81,9 @@ def carried_evidence(
     remembered = was + np.minimum(prior - new_prior, 0)
     hidden = ((from_a < 0) ^ (from_b < 0)) & ~origin.in_sight
     # What has parted is two, and so is what may lie on the other and goes along with it; what was told apart by
-    # less is as much two as all that was seen between them says.
-    two, (between, alike_between) = -2 * inside, _between_bodies(old, new, body)
-    unlike = np.where((between > -inside) & ~new.over, between, two)
+    # less is as much two as all that was seen between them says, the gap there, too.
+    two, (between, gap, alike_between) = -2 * inside, _between_bodies(old, new, body)
+    unlike = np.where((between > -inside) & ~new.over, between + np.minimum(gap - new_prior, 0), two)
     apart = np.where(
         body[a] == body[b],
         # A gap in what is one body is one in the picture.
@@ -109,9 +109,9 @@ def _same_borders(
 
 def _between_bodies(
     old: Belief, new: Keyframe, body: NDArray[np.intp]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The mean evidence [M] of all borders that both bodies of a new border had, and of that for having moved
-    alike [M]; -inf if they had none."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Of all borders that both bodies of a new border had, the mean evidence [M], prior [M] and evidence for
+    having moved alike [M]; -inf if they had none."""
     pairs = np.sort(np.concatenate([old.body[old.keyframe.borders], body[new.borders]]), axis=1)
     _, pair = np.unique(pairs, axis=0, return_inverse=True)
     before, now = np.split(pair.ravel(), [len(old.evidence)])
@@ -121,4 +121,4 @@ def _between_bodies(
         total = np.bincount(before, old.keyframe.length * values, len(pairs))
         return np.divide(total, length, out=np.full(len(pairs), -np.inf), where=length > 0)[now]
 
-    return mean(old.evidence), mean(old.alike)
+    return mean(old.evidence), mean(old.prior), mean(old.alike)

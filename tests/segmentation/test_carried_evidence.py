@@ -105,6 +105,16 @@ def test_a_gap_that_was_seen_once_is_remembered_when_it_has_closed():
         assert told == pytest.approx([remembered])
 
 
+@pytest.mark.parametrize(("prior", "remembered"), [(2.0, 0.125), (2.5, -0.375), (1.0, 0.125)])
+def test_a_gap_between_two_bodies_is_remembered_wherever_they_meet_now(prior, remembered):
+    # 0 and 1 were the body 5, 2 and 3 the body 6; 0 and 3 did not touch. The old picture said 2 of each border.
+    body = np.array([5, 5, 6, 6])
+    origin = Origin(source=np.arange(4), body=body, in_sight=NO)
+    met = [[0, 1], [0, 2], [1, 2], [2, 3]]
+    told = carried(met, [1.0, -1.0, 0.5, 1.0], body, [[0, 3]], origin, prior, length=[1.0, 1.0, 3.0, 1.0])
+    assert told == pytest.approx([remembered])
+
+
 def test_what_was_known_of_no_body_says_nothing_of_what_comes_into_sight():
     origin = Origin(np.array([0, -1, -1]), np.zeros(3, int), NO)
     assert carried([[0, 1]], [3.0], np.zeros(2, int), [[1, 2]], origin) == pytest.approx([0.0])
