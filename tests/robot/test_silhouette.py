@@ -19,7 +19,7 @@ from riseg_drake.app.segmentation_block import FIXED_MARGIN_M, FIXED_MARGIN_PX
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.robot.description import PandaDescription, add_panda
 from riseg_drake.robot.kinematics import READY, PandaKinematics, observe_pose, tip_pointing_down
-from riseg_drake.robot.silhouette import NEAR, RobotSilhouette, UnknownShapeError, hull_corners
+from riseg_drake.robot.silhouette import NEAR, RobotSilhouette, UnknownShapeError, _grown, hull_corners
 
 D415 = Intrinsics(640, 480, 616.285, 615.778, 301.418, 232.864)
 D405 = Intrinsics(640, 480, 433.0, 433.0, 319.5, 239.5)
@@ -134,6 +134,20 @@ def test_the_pusher_enters_only_at_the_lower_edge_and_hides_nothing_that_it_push
     rows, columns = np.nonzero(mask)
     assert rows.min() > v_front - 5
     assert columns.max() - columns.min() < 100
+
+
+def test_a_hull_grows_by_the_margin_at_each_of_its_faces():
+    box = np.array(np.meshgrid([-1, 1], [-2, 2], [-3, 3])).reshape(3, -1).T.astype(float)
+    corners, edges = _grown(np.vstack([box, np.zeros((1, 3))]), 0.5)
+    assert sorted(map(tuple, np.abs(corners))) == [pytest.approx((1.5, 2.5, 3.5))] * 8
+    # 12 edges, and a diagonal of each face.
+    assert len(edges) == 18
+    # Two faces that are all but one (their normals differ by 0.02) go out by the margin.
+    ridge = np.array([[x, y, -0.01 * abs(x) - (z < 0)] for x in (-1, 0, 1) for y in (-1, 1) for z in (0, -1)])
+    top = _grown(ridge, 0.1)[0]
+    at_ridge = top[(np.abs(top[:, 0]) < 0.5) & (top[:, 2] > -0.5)]
+    assert at_ridge[:, 2] == pytest.approx([0.1, 0.1], abs=1e-4)
+    assert np.abs(at_ridge[:, 1]) == pytest.approx([1.1, 1.1], abs=1e-4)
 
 
 def test_a_margin_grows_the_silhouette_on_every_side(panda):

@@ -107,6 +107,9 @@ def test_the_remedy_for_a_mesh_without_normals_gives_it_some(tmp_path):
     assert len([line for line in file.read_text().splitlines() if line.startswith("vn ")]) >= 8
 
 
+SEEN = "<visual name='v'><geometry><box><size>0.04 0.06 0.02</size></box></geometry></visual>"
+
+
 def box_model(folder, name="brick", inertial="<mass>0.2</mass>", shape="", pose="", more="", sees=None):
     shape = shape or "<box><size>0.04 0.06 0.02</size></box>"
     body = f"<geometry>{shape}</geometry>"
@@ -132,6 +135,13 @@ def test_a_box_is_measured_as_it_is_drawn(tmp_path):
     assert model.axes.shape == (0, 3)
     assert model.over_areas
     assert model.X_WB.IsExactlyIdentity()
+
+
+def test_of_many_pieces_only_the_outermost_points_are_kept(tmp_path):
+    # A smaller box amid the other has no corner of the hull.
+    inner = "<collision name='inner'><geometry><box><size>0.01 0.02 0.02</size></box></geometry></collision>"
+    corners = find_model(str(box_model(tmp_path, sees=f"{SEEN}{inner}"))).corners
+    assert sorted(map(tuple, np.abs(corners))) == [pytest.approx((0.02, 0.03, 0.01))] * 8
 
 
 def test_a_models_posture_is_kept_and_its_place_is_not(tmp_path):
