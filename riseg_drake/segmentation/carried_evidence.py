@@ -77,13 +77,15 @@ def carried_evidence(
     known = (from_a >= 0) & (from_b >= 0)
     same_border, place = _same_borders(old.keyframe, from_a, from_b)
     was, prior, alike = (np.append(each, 0.0)[place] for each in (old.evidence, old.prior, old.alike))
-    # A gap that was seen once is remembered when it has closed.
+    # Of a border that there was what it showed, of any other what all borders of its bodies did. A gap that
+    # was seen once is remembered when it has closed.
+    between, gap, alike_between = _between_bodies(old, new, body)
+    was, prior = np.where(same_border, was, between), np.where(same_border, prior, gap)
     remembered = was + np.minimum(prior - new_prior, 0)
     hidden = ((from_a < 0) ^ (from_b < 0)) & ~origin.in_sight
     # What has parted is two, and so is what may lie on the other and goes along with it; what was told apart by
-    # less is as much two as all that was seen between them says, the gap there, too.
-    two, (between, gap, alike_between) = -2 * inside, _between_bodies(old, new, body)
-    unlike = np.where((between > -inside) & ~new.over, between + np.minimum(gap - new_prior, 0), two)
+    # less is as much two as all that was seen between them says.
+    unlike = np.where((between > -inside) & ~new.over, remembered, -2 * inside)
     apart = np.where(
         body[a] == body[b],
         # A gap in what is one body is one in the picture.
