@@ -45,6 +45,14 @@ def test_library_functions_that_call_each_other_count_for_who_called_the_first()
     assert rooms == {"segmentation": pytest.approx(3.0)}
 
 
+def test_where_drake_is_in_no_profile_its_time_is_that_of_who_steps_and_of_who_takes_pictures():
+    step = ("/site/riseg_drake/stations/physics.py", 10, "advance")
+    take = ("/site/riseg_drake/stations/wrist_camera.py", 119, "_take")
+    noise = ("/site/riseg_drake/stations/sensor_noise.py", 9, "noisy_depth")
+    rooms = seconds_by_room({f: (1, 1, own, own, {}) for f, own in ((step, 4.0), (take, 2.0), (noise, 1.0))})
+    assert rooms == {STEPPING: 4.0, DRAWING: 2.0, "stations": 1.0}
+
+
 @pytest.mark.renders
 def test_a_run_is_told_room_by_room_and_adds_up(small_scenario, tmp_path, capsys):
     file = tmp_path / "run.json"
