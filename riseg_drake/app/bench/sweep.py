@@ -19,6 +19,7 @@ from riseg_drake.app.graphics import require_graphics
 from riseg_drake.app.output_folder import to_json, write_told
 from riseg_drake.app.run.interactions import Progress, interactions
 from riseg_drake.app.scenario import Scenario, load_scenario
+from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.learned.sam import SamParameters
 from riseg_drake.systems.stage_clock import StageClock
@@ -66,8 +67,12 @@ def sweep_command(
     rows: dict[str, dict[str, Any]] = {}
     for number, case in enumerate(cases, start=1):
         at = f"{number} of {len(cases)}: {case.name}"
-        with console.status(at) as status:
-            times = pair_times(scenario_of(scenario, case), seed, partial(_tell, status, at))
+        try:
+            with console.status(at) as status:
+                times = pair_times(scenario_of(scenario, case), seed, partial(_tell, status, at))
+        except ScenarioError as error:  # fewer models than that, or no room for so many
+            console.print(f"{case.name} left out: {error}", soft_wrap=True)
+            continue
         rows[case.name] = {**asdict(case), "pairs": times.figures()}
     console.print(sweep_table(rows))
     if json_file is not None:

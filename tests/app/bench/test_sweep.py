@@ -65,6 +65,14 @@ def test_every_pair_of_every_case_is_in_the_table_and_in_the_file(
         assert f"{pairs[MOVING]['median_ratio']:.1f}" in line.split()
 
 
+@pytest.mark.renders
+def test_a_case_that_the_models_do_not_suffice_for_is_left_out_and_told(small_scenario, tmp_path, capsys):
+    file = tmp_path / "sweep.json"
+    sweep_command(small_scenario, 1, file, Console(width=200), (Case(160, 120, 99),))
+    assert json.loads(file.read_text())["cases"] == {}
+    assert "160x120, 99 objects left out: " in capsys.readouterr().out
+
+
 def test_only_one_thing_is_measured_at_a_time(capsys):
     with pytest.raises(SystemExit):
         main(["bench", "--sweep", "--run"])
