@@ -45,7 +45,7 @@ class ArmWatch:
         self._way_back, self._off_path = way_back, off_path
         self._push = NO_PUSH
         self._next = 0.0
-        self._said = Mode.FOLLOWING
+        self._said = Mode.FOLLOWING, Cause.NONE
         self._told: dict[Cause, float] = {}
         self.pauses = 0
         """How often the arm has paused so far."""
@@ -65,13 +65,14 @@ class ArmWatch:
                 self._ask(report)
         elif state.mode is Mode.ENDED or report.refused:
             self._progress.end = report.refused or state.cause.value
-        elif state.mode is Mode.PAUSED and self._said is not Mode.PAUSED:
-            self._tell_pause(state.cause)
-        self._said = state.mode
+        elif state.mode is Mode.PAUSED:
+            self.pauses += self._said[0] is not Mode.PAUSED
+            if self._said != (state.mode, state.cause):  # a driver that ends amid a pause is news
+                self._tell_pause(state.cause)
+        self._said = state.mode, state.cause
         return bool(self._progress.end)
 
     def _tell_pause(self, cause: Cause) -> None:
-        self.pauses += 1
         now = time.monotonic()
         if now - self._told.get(cause, -math.inf) >= self.QUIET:
             self._told[cause] = now

@@ -124,6 +124,16 @@ def test_a_pause_needs_no_answer_and_is_not_told_again_soon(monkeypatch):
     assert len(desk.told) == 3
 
 
+def test_a_driver_that_ends_amid_a_pause_is_told_and_the_pause_counts_once(monkeypatch):
+    desk = Desk(monkeypatch)
+    for cause in (Cause.IMAGES_OLD, Cause.STATUS_OLD, Cause.IMAGES_OLD, Cause.STATUS_OLD):
+        assert not desk.look(Mode.PAUSED, cause)
+    assert [line.split(";")[0] for line in desk.told] == [
+        f"paused: {cause.value}" for cause in (Cause.IMAGES_OLD, Cause.STATUS_OLD)
+    ]
+    assert desk.watch.pauses == 1
+
+
 def test_contact_is_announced_once_and_for_the_push_alone(monkeypatch):
     desk = Desk(monkeypatch)
     path = SimpleNamespace(push_start=3.0, push_end=5.0)
