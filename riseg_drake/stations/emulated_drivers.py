@@ -28,7 +28,7 @@ class EmulatorConfig:
     driver: PandaDriverConfig = field(default_factory=PandaDriverConfig)
     """The arm's driver."""
     rate: float = field(default=5.0, metadata={"least": 0.1, "most": 120.0})
-    """Pictures a second at most, 1/s; fewer come where drawing takes longer. Two cores also have to run what looks
+    """Pictures a second at most; fewer come where drawing takes longer. Two cores also have to run what looks
     at them, and the arm, which cannot wait."""
     software_depth_registration: bool = True
     """The camera driver's flag of that name: whether aligned depth is published."""
