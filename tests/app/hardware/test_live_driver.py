@@ -106,9 +106,14 @@ def test_a_live_driver_connects_holds_tells_a_reflex_by_name_and_recovers_at_the
             client.until_at(beside)
             assert client.says == "" or client.words
 
-            server.say("reflex")
-            client.until(lambda: client.status.robot_mode == REFLEX and client.says)
-            assert client.says.startswith("the robot takes no commands: joint_velocity_violation")
+            named = "the robot takes no commands: joint_velocity_violation"
+            for _ in range(5):  # a robot that this machine was late for has a reflex of another name already
+                client.until_at(beside)
+                server.say("reflex")
+                client.until(lambda: client.status.robot_mode == REFLEX and client.says)
+                if client.says.startswith(named):
+                    break
+            assert client.says.startswith(named)
             client.held = start
             client.until_more(300)  # commands alone lead nowhere
             assert client.status.robot_mode == REFLEX
