@@ -88,7 +88,7 @@ def command_line() -> argparse.ArgumentParser:
     evaluate.add_argument(
         "--ablation",
         action="store_true",
-        help="also record the runs, and segment them as the paper has it, one switch at a time",
+        help="also record the runs, and segment them as the paper has it, or without a part, one at a time",
     )
 
     evaluate.add_argument(

@@ -45,11 +45,11 @@ def evaluate(chosen: argparse.Namespace, console: Console) -> None:
 
 def _evaluation_of(suite: str | None) -> tuple[str, list[str]]:
     """A kind of evaluation, as one would say it, and the options that only others have."""
-    scenes, own = ["objects", "ablation", "baseline", "masks"], ["scenario", "recordings"]
+    scenes, own = ["objects", "baseline", "masks"], ["scenario", "recordings"]
     if suite is None:
         return "an evaluation without --suite films", ["recordings"]
     if suite == "films":
-        return "--suite films", [*scenes, "scenes", "dask"]
+        return "--suite films", [*scenes, "ablation", "scenes", "dask"]
     return f"--suite {suite}", scenes + own
 
 

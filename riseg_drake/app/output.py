@@ -71,6 +71,8 @@ class Step:
     """What the interaction did to the objects; only in simulation, and not in step 0."""
     in_motion: InMotion | None = None
     """How well they were segmented while they moved; the same, and only where one moved in sight."""
+    moved: Mapping[float, Sequence[int]] = field(default_factory=dict)
+    """By the time of each frame that counts for that, s, the true ids of what had moved."""
 
     @property
     def objects(self) -> int:
@@ -187,6 +189,7 @@ def _step_to_json(step: Step) -> dict[str, Any]:
         content["refined_scores"] = step.refined_scores.as_dict()
     if step.in_motion is not None:
         content["in_motion"] = asdict(step.in_motion)
+        content["moved"] = [{"time_s": time, "ids": [*ids]} for time, ids in step.moved.items()]
     if step.disturbance is not None:
         content["pushed"] = step.disturbance.pushed
         content["motions"] = {name: asdict(motion) for name, motion in step.disturbance.motions.items()}

@@ -39,6 +39,11 @@ def moved_objects(
     }
 
 
+def all_moved(by_frame: Mapping[float, Iterable[int]]) -> set[int]:
+    """The ids of what had moved in any frame of an interaction."""
+    return set().union(*by_frame.values())
+
+
 def overlap_f_of(moved: Iterable[int], mask: NDArray, labels: NDArray) -> float:
     """Mean Overlap F, in [0, 1], of the moved objects in one mask [H, W] with its true labels [H, W]; NaN
     with none in sight.

@@ -40,6 +40,8 @@ class SceneResult:
     """Of other methods on the same images, by name, from step 0 on."""
     ablation: Mapping[str, Sequence[Scores]] = field(default_factory=dict)
     """Of the recorded run segmented otherwise, by the switch's name, from step 0 on."""
+    ablation_in_motion: Mapping[str, Sequence[InMotion | None]] = field(default_factory=dict)
+    """Of the same, while things moved, from the first interaction on."""
     ablation_failures: Mapping[str, str] = field(default_factory=dict)
     """Why a switch failed on the way, by its name; it has the scores that it had until then."""
 

@@ -9,7 +9,13 @@ import numpy as np
 
 from riseg_drake.evaluation.disturbance import DisturbanceFigures, disturbance_of_all
 from riseg_drake.evaluation.in_motion import MOVED, InMotion, mean_over_scenes
-from riseg_drake.evaluation.report import DISTURBANCE_HEAD, disturbance_cells, markdown_table, percent
+from riseg_drake.evaluation.report import (
+    DISTURBANCE_HEAD,
+    ablation_section,
+    disturbance_cells,
+    markdown_table,
+    percent,
+)
 from riseg_drake.evaluation.scene_result import SceneResult
 from riseg_drake.evaluation.scores import Scores
 from riseg_drake.evaluation.step_means import step_means
@@ -74,6 +80,7 @@ def suite_text(kinds: Sequence[KindResult], about: Mapping[str, object]) -> str:
         for scene in kind.scenes
     ]
     moved = moved_table(kinds)
+    ablation = ablation_section([s for kind in kinds for s in kind.scenes], max(k.last_step for k in kinds))
     return "\n".join(
         [
             "# A suite of scenes\n",
@@ -85,6 +92,7 @@ def suite_text(kinds: Sequence[KindResult], about: Mapping[str, object]) -> str:
             markdown_table(moved.head, moved.rows),
             f"Overlap F, in percent, of what has moved by {100 * MOVED:g} cm or more, in every frame from\n"
             "then on until the camera observes again, and of the same at rest after it.\n",
+            *([ablation] if ablation else []),
             "## The scenes\n",
             linked(scenes_table(kinds), pictures),
         ]

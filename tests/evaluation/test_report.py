@@ -40,6 +40,7 @@ GOOD = SceneResult(
     in_motion=[InMotion(10, 0.8, 0.9), None],
     baselines={"depth clusters": scores(0.7, 0.7, 0.6)},
     ablation={"no memory": scores(0.0, 0.5, 0.8)},
+    ablation_in_motion={"no memory": [InMotion(10, 0.6, 0.7), None]},
 )
 FAILED = SceneResult(name="scene_001", seed=101, failure="the table broke", end="the table broke")
 BETTER = replace(
@@ -49,6 +50,7 @@ BETTER = replace(
     unsettled_area_m2=0.0010,
     in_motion=[InMotion(30, 0.6, 0.7), InMotion(10, 1.0, 0.9)],
     ablation={"no memory": scores(0.0, 0.5, 0.6)},
+    ablation_in_motion={"no memory": [InMotion(30, 0.2, 0.7), InMotion(10, 0.6, 0.9)]},
 )
 
 
@@ -110,8 +112,18 @@ def test_how_the_runs_ended_is_counted_with_what_was_left(text):
 def test_a_switch_is_compared_scene_by_scene():
     text = report_text([GOOD, BETTER], {}, last_step=2)
     # Differences of -10 and -30: mean -20, standard error 10.
-    assert rows(text, "no memory")[0][-1] == "-20.0 ± 10.0"
-    assert "one switch at a time" not in report_text([FAILED], {}, last_step=2)
+    assert rows(text, "no memory")[0][7] == "-20.0 ± 10.0"
+    # In motion 60 and (30 * 20 + 10 * 60) / 40 = 30, where ours have 80 and 70: -20 and -40.
+    assert rows(text, "no memory")[0][8:] == ["45.0", "-30.0 ± 10.0"]
+    assert rows(text.split("## What each part is worth")[1], "**riseg_drake**")[0][7:] == ["", "75.0", ""]
+    assert "What each part is worth" not in report_text([FAILED], {}, last_step=2)
+
+
+def test_a_switch_under_which_nothing_moved_in_sight_is_not_compared_in_motion():
+    still = replace(GOOD, ablation_in_motion={})
+    assert rows(report_text([still], {}, last_step=2), "no memory")[0][7:] == ["-10.0", "–", "–"]
+    # A scene where it is unknown is left out of the mean and of the difference.
+    assert rows(report_text([still, BETTER], {}, last_step=2), "no memory")[0][8:] == ["30.0", "-40.0"]
 
 
 def test_a_table_has_its_figures_to_the_right_and_no_cell_ends_a_row():
@@ -174,10 +186,12 @@ def test_what_was_left_is_over_the_runs_in_which_it_is_known():
 def test_ours_and_each_switch_are_in_percent_after_the_last_interaction():
     broken = replace(GOOD, ablation_failures={"no memory": "out of memory"})
     text = report_text([broken], {}, last_step=2)
-    ours = rows(text.split("one switch at a time")[1], "**riseg_drake**")
-    assert ours == [["100.0", "0.0", "90.0", "100.0", "0.0", "0.0", "90.0", ""]]
+    ours = rows(text.split("What each part is worth")[1], "**riseg_drake**")
+    assert ours == [["100.0", "0.0", "90.0", "100.0", "0.0", "0.0", "90.0", "", "80.0", ""]]
     # One scene has no standard error.
-    assert rows(text, "no memory") == [["100.0", "0.0", "80.0", "100.0", "0.0", "0.0", "80.0", "-10.0"]]
+    assert rows(text, "no memory") == [
+        ["100.0", "0.0", "80.0", "100.0", "0.0", "0.0", "80.0", "-10.0", "60.0", "-20.0"]
+    ]
     assert "In scene_000 *no memory* failed on the way and keeps what it had: out of memory\n" in text
 
 

@@ -113,6 +113,15 @@ def test_every_scene_is_named_with_its_picture_and_its_end(text):
     ]
 
 
+def test_a_switch_is_compared_over_the_scenes_of_all_kinds_each_carried_to_its_end():
+    toy = replace(LONG, ablation={"no memory": scores(0.0, 0.25)})  # 25 against 75
+    pile = replace(SHORT, ablation={"no memory": scores(0.0, 0.25, 0.25, 0.15)})  # 15 against 25
+    text = suite_text([replace(TOYS, scenes=[toy]), replace(PILE, scenes=[pile])], {})
+    (row,) = (line for line in text.splitlines() if line.startswith("| no memory "))
+    assert [cell.strip() for cell in row.strip("|").split("|")][3:9:5] == ["20.0", "-30.0 ± 20.0"]
+    assert "no memory" not in suite_text([TOYS, PILE], {})
+
+
 def test_the_most_frequent_end_comes_first():
     kind = replace(TOYS, scenes=[SHORT, LONG, BROKEN, LONG, LONG, BROKEN])
     assert list(kind.endings.items()) == [

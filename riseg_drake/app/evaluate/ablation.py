@@ -3,15 +3,18 @@ time."""
 
 import copy
 import operator
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import reduce
 from pathlib import Path
 from typing import Any
 
+from numpy.typing import NDArray
+
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.segment.replay import Replay
 from riseg_drake.app.segmentation_block import panda_view
+from riseg_drake.evaluation.in_motion import InMotion, all_moved, in_motion, overlap_f_of
 from riseg_drake.evaluation.scores import Scores, score
 from riseg_drake.recording.layout import RecordedFrame, RecordingError
 from riseg_drake.recording.reader import RecordingReader
@@ -56,8 +59,25 @@ class Ablation:
 
     scores: dict[str, list[Scores]]
     """After each step of the run; fewer where the version failed on the way."""
+    in_motion: dict[str, list[InMotion | None]]
+    """While things moved, in each interaction; None where nothing moved in sight."""
     failures: dict[str, str]
     """Why, in one line, for the versions that failed."""
+
+
+@dataclass(frozen=True)
+class RecordedStep:
+    """A step of the recorded run: which frames are to be scored."""
+
+    time: float
+    """Of the frame at rest that ends it, s."""
+    moved: Mapping[float, Collection[int]] = field(default_factory=dict)
+    """By the time of each frame in motion before that, s, the true ids of what had moved."""
+
+    @classmethod
+    def from_summary(cls, step: Mapping[str, Any]) -> "RecordedStep":
+        """As the run's `summary.json` has it."""
+        return cls(step["time_s"], {frame["time_s"]: frame["ids"] for frame in step.get("moved", ())})
 
 
 def versions() -> dict[str, Switch]:
@@ -79,47 +99,81 @@ def switched(scenario: Scenario, switch: Switch) -> Scenario:
     return other
 
 
-def ablate(scenario: Scenario, seed: int, recording: Path, times: Sequence[float]) -> "Ablation":
-    """Segment a recording with every version and score the masks at some times.
+def ablate(scenario: Scenario, seed: int, recording: Path, steps: Sequence[RecordedStep]) -> Ablation:
+    """Segment a recording with every version, and score the masks at the steps of its run and in motion.
 
     Args:
         scenario: of the recorded run.
         seed: of the recorded run.
         recording: its folder, with joint angles and true labels.
-        times: of the frames to score, s, in rising order: the steps of the run.
+        steps: of the run, in the order of time; the first is before any interaction.
 
     Raises:
-        RecordingError: a frame of these times, or its true labels, are missing.
+        RecordingError: a frame at rest of these steps, or the true labels of any of their frames, are missing.
     """
     kinematics = PandaKinematics(scenario.station.panda, scenario.station.camera.fixed_pose)
-    replays = {
-        name: Replay(switched(scenario, switch), panda_view(scenario, kinematics), seed)
+    scored = {
+        name: _Version(Replay(switched(scenario, switch), panda_view(scenario, kinematics), seed))
         for name, switch in versions().items()
     }
-    scores: dict[str, list[Scores]] = {name: [] for name in replays}
+    alive = dict(scored)
     failures: dict[str, str] = {}
-    wanted = [round(time, 6) for time in times]
+    wanted = list(steps)
     for frame in RecordingReader(recording):
         if not wanted:
             break
-        counts = round(frame.time, 6) == wanted[0]
-        for name in list(replays):
+        time, step = _stamp(frame.time), wanted[0]
+        moved = {_stamp(t): ids for t, ids in step.moved.items()}.get(time)
+        rests = time == _stamp(step.time)
+        labels = _labels(frame, recording) if rests or moved is not None else None
+        for name, version in list(alive.items()):
             try:
-                mask = replays[name].mask_after(frame)
+                mask = version.replay.mask_after(frame)
             except (ValueError, RuntimeError, ArithmeticError) as error:
                 failures[name] = " ".join(str(error).split())
-                del replays[name]
+                del alive[name]
                 continue
-            if counts:
-                scores[name].append(score(mask, _labels(frame, recording)))
-        if counts:
+            if labels is not None and moved is not None:
+                version.meet(mask, labels, moved)
+            if labels is not None and rests:
+                version.close(mask, labels, all_moved(step.moved))
+        if rests:
             wanted.pop(0)
     if wanted:
-        raise RecordingError(f"{recording} has no frame at {wanted[0]} s")
-    return Ablation(scores, failures)
+        raise RecordingError(f"{recording} has no frame at {wanted[0].time} s")
+    return Ablation(
+        scores={name: version.scores for name, version in scored.items()},
+        in_motion={name: version.in_motion[1:] for name, version in scored.items()},  # step 0 is no interaction
+        failures=failures,
+    )
 
 
-def _labels(frame: RecordedFrame, recording: Path) -> Any:
+class _Version:
+    """What became of one version so far."""
+
+    def __init__(self, replay: Replay):
+        self.replay = replay
+        self.scores: list[Scores] = []
+        self.in_motion: list[InMotion | None] = []
+        self._overlap_f: list[float] = []
+
+    def meet(self, mask: NDArray, labels: NDArray, moved: Collection[int]) -> None:
+        """Score a frame in motion, of what has moved."""
+        self._overlap_f.append(overlap_f_of(moved, mask, labels))
+
+    def close(self, mask: NDArray, labels: NDArray, moved: Collection[int]) -> None:
+        """Score the frame at rest that ends a step; `moved` is what has in any frame of it."""
+        self.scores.append(score(mask, labels))
+        self.in_motion.append(in_motion(self._overlap_f, overlap_f_of(moved, mask, labels)))
+        self._overlap_f = []
+
+
+def _stamp(time: float) -> float:
+    """A time that is the same, s, whatever its last digits became in a file."""
+    return round(time, 6)
+
+
+def _labels(frame: RecordedFrame, recording: Path) -> NDArray:
     if frame.labels is None:
         raise RecordingError(f"{recording} has no true labels at {frame.time} s")
     return frame.labels

@@ -85,8 +85,10 @@ def missing_baselines(task: SceneTask) -> set[str]:
 
 
 def ablation_is_finished(task: SceneTask) -> bool:
-    """Whether every version that there is to compare has its scores."""
-    return set(_scores_from_json(read_json(task.folder / ABLATION_FILE).get("scores"))) == set(versions())
+    """Whether every version that there is to compare has its scores, at rest and in motion."""
+    content = read_json(task.folder / ABLATION_FILE)
+    both = _scores_from_json(content.get("scores")), _in_motion_from_json(content.get("in_motion"))
+    return all(set(figures) == set(versions()) for figures in both)
 
 
 def note_death(task: SceneTask, failure: str) -> None:
@@ -122,6 +124,7 @@ def read_result(task: SceneTask, failure: str = "") -> SceneResult:
         in_motion=in_motion,
         baselines={name: baselines[name] for name in task.baselines if name in baselines},
         ablation=_scores_from_json(ablation.get("scores")),
+        ablation_in_motion=_in_motion_from_json(ablation.get("in_motion")),
         ablation_failures=_texts(ablation.get("failures")),
     )
 
@@ -176,6 +179,15 @@ def _scores_from_json(content: Any) -> dict[str, list[Scores]]:
         with suppress(*_DAMAGED):
             scores[name] = [Scores.from_dict(each) for each in steps]
     return scores
+
+
+def _in_motion_from_json(content: Any) -> dict[str, list[InMotion | None]]:
+    """The masks in motion of each version whose entry can be read."""
+    figures = {}
+    for name, interactions in content.items() if isinstance(content, Mapping) else ():
+        with suppress(*_DAMAGED):
+            figures[name] = [_in_motion(each) for each in interactions]
+    return figures
 
 
 def _texts(content: Any) -> dict[str, str]:

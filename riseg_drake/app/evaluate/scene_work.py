@@ -3,13 +3,13 @@
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from time import perf_counter
 
 import cv2
 from threadpoolctl import threadpool_limits
 
-from riseg_drake.app.evaluate.ablation import ablate
+from riseg_drake.app.evaluate.ablation import RecordedStep, ablate
 from riseg_drake.app.evaluate.sam_baseline import score_sam
 from riseg_drake.app.evaluate.scene_baselines import score_baselines
 from riseg_drake.app.evaluate.scene_folder import (
@@ -102,9 +102,16 @@ def _score_others(task: SceneTask, scenario: Scenario) -> None:
             earlier = read_json(task.folder / BASELINE_FILE)
             write_text(task.folder / BASELINE_FILE, to_json({**earlier, **scores}))
     if task.ablation and steps and not ablation_is_finished(task):
-        times = [step["time_s"] for step in steps]
-        ablation = ablate(scenario, task.seed, task.folder / RECORDING, times)
-        content = {"scores": _scores_to_json(ablation.scores), "failures": ablation.failures}
+        recorded = [RecordedStep.from_summary(step) for step in steps]
+        ablation = ablate(scenario, task.seed, task.folder / RECORDING, recorded)
+        content = {
+            "scores": _scores_to_json(ablation.scores),
+            "in_motion": {
+                name: [None if each is None else asdict(each) for each in interactions]
+                for name, interactions in ablation.in_motion.items()
+            },
+            "failures": ablation.failures,
+        }
         write_text(task.folder / ABLATION_FILE, to_json(content))
 
 

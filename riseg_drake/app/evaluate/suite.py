@@ -72,6 +72,8 @@ class SuiteRequest:
     """Address of a Dask scheduler that does them, or None."""
     output: Path | None = None
     """Folder (out/suite_NAME_seed_S)."""
+    ablation: bool = False
+    """Whether each recording is segmented again with parts of the algorithm switched off."""
     overwrite: bool = False
     """Whether an earlier run there is removed first."""
 
@@ -80,7 +82,7 @@ def suite_command(request: SuiteRequest, console: Console) -> None:
     """Run what is missing of a suite, then write its table. Raises EvaluationError where every scene failed."""
     kinds = find_suite(request.suite)
     folder = request.output or Path("out") / f"suite_{Path(request.suite).name}_seed_{request.seed}"
-    tasks = {kind: kind_tasks(kind, folder, request.scenes, request.seed) for kind in kinds}
+    tasks = {kind: kind_tasks(kind, folder, request.scenes, request.seed, request.ablation) for kind in kinds}
     pool = pool_for(request.jobs, request.dask)
     results = evaluate_suite(tasks, folder, pool, console, request.overwrite)
     rows = [(each.name, step_means([s.scores for s in each.scenes], each.last_step)[-1]) for each in results]
@@ -145,9 +147,9 @@ def evaluate_suite(
     return results
 
 
-def kind_tasks(kind: Kind, folder: Path, scenes: int, seed: int) -> list[SceneTask]:
+def kind_tasks(kind: Kind, folder: Path, scenes: int, seed: int, ablation: bool = False) -> list[SceneTask]:
     """The scenes of a kind: scene k has the seed `seed + k`; `folder` is the suite's."""
-    return scene_tasks(kind.scenario, kind.folder, folder / kind.folder, scenes, seed)
+    return scene_tasks(kind.scenario, kind.folder, folder / kind.folder, scenes, seed, ablation)
 
 
 def _of_kind(

@@ -1,4 +1,5 @@
 import json
+from dataclasses import asdict
 from functools import reduce
 
 import cv2
@@ -11,6 +12,7 @@ from riseg_drake.app.evaluate.ablation import (
     AS_IN_THE_PAPER,
     LITERAL,
     LITERAL_STEPS,
+    RecordedStep,
     ablate,
     switched,
     versions,
@@ -81,12 +83,25 @@ def test_a_replay_gives_the_masks_of_the_run_itself(recorded, small_scenario):
 def test_each_version_is_scored_at_the_steps_of_the_run(recorded, small_scenario, monkeypatch):
     scenario = load_scenario(small_scenario)
     monkeypatch.setattr(ablation, "versions", lambda: {"as it is": {}})
-    times = [step["time_s"] for step in steps(recorded)]
-    result = ablate(scenario, 1, recorded / "recording", times)
+    recorded_steps = [RecordedStep.from_summary(step) for step in steps(recorded)]
+    result = ablate(scenario, 1, recorded / "recording", recorded_steps)
     own = [step["scores"] for step in steps(recorded)]
     assert [scores.as_dict() for scores in result.scores["as it is"]] == [pytest.approx(each) for each in own]
     with pytest.raises(RecordingError, match=r"no frame at 1000\.0 s"):
-        ablate(scenario, 1, recorded / "recording", [1000.0])
+        ablate(scenario, 1, recorded / "recording", [RecordedStep(1000.0)])
+
+
+@pytest.mark.renders
+def test_what_moved_is_scored_in_the_same_frames_as_in_the_run(recorded, small_scenario, monkeypatch):
+    scenario = load_scenario(small_scenario)
+    monkeypatch.setattr(ablation, "versions", lambda: {"as it is": {}})
+    recorded_steps = [RecordedStep.from_summary(step) for step in steps(recorded)]
+    result = ablate(scenario, 1, recorded / "recording", recorded_steps)
+    own = [step.get("in_motion") for step in steps(recorded)[1:]]
+    assert any(own)
+    assert [each and asdict(each) for each in result.in_motion["as it is"]] == [
+        each and pytest.approx(each) for each in own
+    ]
 
 
 @pytest.mark.renders
@@ -94,7 +109,7 @@ def test_a_version_that_fails_on_the_way_keeps_what_it_had(recorded, small_scena
     scenario = load_scenario(small_scenario)
     broken = {"segment.method": "freehand"}
     monkeypatch.setattr(ablation, "versions", lambda: {"broken": broken})
-    times = [step["time_s"] for step in steps(recorded)]
-    result = ablate(scenario, 1, recorded / "recording", times)
-    assert len(result.scores["broken"]) < len(times)
+    recorded_steps = [RecordedStep.from_summary(step) for step in steps(recorded)]
+    result = ablate(scenario, 1, recorded / "recording", recorded_steps)
+    assert len(result.scores["broken"]) < len(recorded_steps)
     assert "choose evidence or paper" in result.failures["broken"]

@@ -7,6 +7,7 @@ from rich.console import Console
 
 from riseg_drake.app.cli import main
 from riseg_drake.app.evaluate import scene_work
+from riseg_drake.app.evaluate.ablation import Ablation, versions
 from riseg_drake.app.evaluate.scene_pool import local_pool
 from riseg_drake.app.evaluate.suite import evaluate_suite, find_suite, kind_tasks
 from riseg_drake.app.output import RunFolder, Step
@@ -100,6 +101,30 @@ def test_an_interrupted_suite_goes_on_where_it_stopped(suite, tmp_path, runs):
     assert len(runs) == 4
 
 
+def test_an_ablation_segments_the_recorded_scenes_of_every_kind_again(suite, tmp_path, runs, monkeypatch):
+    switched = []
+
+    def ablate(scenario, seed, recording, steps):
+        switched.append((recording.parent.parent.name, seed, [step.time for step in steps]))
+        half = [score(np.zeros_like(SQUARE), SQUARE), score(np.where(np.arange(64) < 20, SQUARE, 0), SQUARE)]
+        figures = dict.fromkeys(versions(), half)
+        return Ablation(figures, {name: [InMotion(10, 0.25, 0.5)] for name in versions()}, {})
+
+    monkeypatch.setattr(scene_work, "ablate", ablate)
+    output = tmp_path / "out"
+    kinds = {kind: kind_tasks(kind, output, 1, 0, ablation=True) for kind in find_suite(str(suite))}
+    for _ in range(2):  # the second time nothing is left to do
+        evaluate_suite(kinds, output, local_pool(1), QUIET)
+        assert runs == [("1_early_bird", 0), ("2_late", 0)]
+        assert switched == [("1_early_bird", 0, [0.0, 0.1]), ("2_late", 0, [0.0, 0.1])]
+    row = next(
+        line for line in (output / "report.md").read_text().splitlines() if line.startswith("| no memory")
+    )
+    # Ours found all of it, and had 50 in motion.
+    cells = [cell.strip() for cell in row.strip("| ").split("|")]
+    assert [cells[3], *cells[8:]] == ["66.7", "-33.3 ± 0.0", "25.0", "-25.0 ± 0.0"]
+
+
 def test_the_folder_of_something_else_is_refused(suite, tmp_path, runs):
     output = tmp_path / "out"
     evaluate_suite(tasks(suite, output), output, local_pool(1), QUIET)
@@ -147,7 +172,7 @@ def test_clutter_has_nine_kinds_with_the_layouts_and_pushes_that_they_are_known_
     [
         (["--suite", "clutter", "--objects", "my_models"], "--objects does not go with --suite clutter"),
         (["--suite", "clutter", "--scenario", "my.yaml"], "--scenario does not go with --suite clutter"),
-        (["--suite", "clutter", "--ablation"], "--ablation does not go with --suite clutter"),
+        (["--suite", "films", "--ablation"], "--ablation does not go with --suite films"),
         (["--suite", "films", "--masks", "a=b"], "--masks does not go with --suite films"),
         (["--recordings", "my_films"], "--recordings does not go with an evaluation without --suite films"),
     ],

@@ -65,14 +65,18 @@ def test_moved_objects_are_scored_in_every_frame_from_one_centimetre_on_and_draw
     assert scene.drawn == [4, 5, 6]
     scene.found = 8
     book.count(frame(7), is_at_rest=True)
-    figures = book.close(1).in_motion
+    step = book.close(1)
+    assert step.moved == {frame(sequence).time: [1] for sequence in (4, 5, 6)}
+    figures = step.in_motion
     assert figures.frames == 3
     assert figures.overlap_f == pytest.approx((2 / 3 + 1 + 0) / 3)  # P = 1, R = 1 / 2; all; nothing
     assert figures.at_rest_f == pytest.approx(2 * 0.8 / 1.8)
     # The next interaction counts from where things stand now.
     book.count(frame(8), is_at_rest=False)
     book.count(frame(9), is_at_rest=True)
-    assert book.close(2).in_motion is None
+    step = book.close(2)
+    assert step.in_motion is None
+    assert step.moved == {}
 
 
 def test_where_nobody_knows_the_truth_nothing_is_scored():
