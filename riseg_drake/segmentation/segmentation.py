@@ -55,9 +55,14 @@ class Segmentation(Immutable):
 
     @property
     def settled_mask(self) -> NDArray[np.uint16]:
-        """L_t [H, W] without the objects in doubt: what needs no further push."""
-        doubtful = [a for a, margin in self.margin.items() if margin < self.settled]
+        """L_t [H, W] without the objects in doubt: what needs no further push.
+
+        An id that was seen in motion alone is in doubt until a rest decides on it.
+        """
         mask = self.mask
+        remembered = dict.fromkeys(self.memory, self.settled)
+        margins = {**dict.fromkeys(np.unique(mask).tolist(), 0.0), **remembered, **self.margin}
+        doubtful = [a for a, margin in margins.items() if margin < self.settled]
         return np.where(np.isin(mask, doubtful), np.uint16(0), mask) if doubtful else mask
 
     @property

@@ -1,5 +1,6 @@
 """What a segmentation says of its ids."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,7 +19,17 @@ def test_the_mask_has_the_ids_and_nothing_of_what_has_not_moved():
 def test_what_is_in_doubt_by_less_than_the_settled_margin_is_not_in_the_settled_mask():
     seen = Segmentation(0, LABEL, margin={3: 1.9, 7: 2.0, 9: 2.1}, settled=2.0)
     assert seen.settled_mask.tolist() == [[0, 0, 0], [7, 7, 9]]
-    assert Segmentation(0, LABEL, margin={3: 2.5}, settled=2.0).settled_mask.tolist() == [[0, 0, 3], [7, 7, 9]]
+
+
+def test_an_id_that_no_rest_has_decided_on_is_in_doubt_but_not_one_that_comes_back_into_view():
+    seen = Segmentation(0, LABEL, margin={3: 2.5}, settled=2.0)
+    assert seen.settled_mask.tolist() == [[0, 0, 3], [0, 0, 0]]
+    assert replace(seen, memory={7: None}).settled_mask.tolist() == [[0, 0, 3], [7, 7, 0]]
+    assert replace(seen, memory={3: None}, margin={3: 1.9}).settled_mask.tolist() == [[0, 0, 0], [0, 0, 0]]
+
+
+def test_where_nothing_tells_of_doubt_as_in_the_paper_every_id_is_settled():
+    assert Segmentation(0, LABEL).settled_mask.tolist() == [[0, 0, 3], [7, 7, 9]]
 
 
 def test_confidence_is_a_half_at_half_the_settled_margin_and_rises_with_it():
