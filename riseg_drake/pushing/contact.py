@@ -55,10 +55,11 @@ def find_contacts(
     Parts of the cluster that the tip's end face passes over at its lowest do not count as contact.
     `target` is the part of the cluster that is to move, if not all of it [rows, columns].
     """
-    lowest_object = pusher.lowest_tip_height / pusher.height_share
-    reach = max(pusher.width, parameters.d_push)
+    width, room = pusher.tool.width, pusher.parameters
+    lowest_object = room.lowest_tip_height / room.height_share
+    reach = max(width, parameters.d_push)
     along = np.arange(-reach, reach, table.cell)
-    across = np.linspace(-pusher.width / 2, pusher.width / 2, int(np.ceil(pusher.width / table.cell)) + 1)
+    across = np.linspace(-width / 2, width / 2, int(np.ceil(width / table.cell)) + 1)
     swath = rectangle(boundary_W, direction_W, along, across)
     height = np.where(table.lookup(cluster, swath), table.lookup(table.height, swath), 0.0)
     profile = height.max(axis=2)  # [N, S]
@@ -74,24 +75,20 @@ def find_contacts(
     skin_height[~touched] = 0.0
     b_W = boundary_W + travel[:, None] * direction_W
 
-    margin = pusher.margin / 2
-    across = np.linspace(
-        -pusher.width / 2 - margin,
-        pusher.width / 2 + margin,
-        int(np.ceil((pusher.width + 2 * margin) / table.cell)) + 1,
-    )
+    width += room.margin
+    across = np.linspace(-width / 2, width / 2, int(np.ceil(width / table.cell)) + 1)
     gap = rectangle(b_W, direction_W, np.arange(-parameters.clearance, 0.0, table.cell), across)
     stroke = rectangle(b_W, direction_W, np.arange(0.0, parameters.d_push, table.cell), across)
     strangers = table.objects & ~cluster
     known = strangers & table.segmented
     met = np.any(table.lookup(strangers, gap), axis=(1, 2))
     met |= np.any(table.lookup(known, stroke), axis=(1, 2))
-    tip_height = np.minimum(pusher.tip_height, pusher.height_share * skin_height)
+    tip_height = np.minimum(room.tip_height, room.height_share * skin_height)
     return Contacts(
         b_W=b_W,
         height=skin_height,
         face=face,
-        tip_height=np.maximum(tip_height, pusher.lowest_tip_height),
+        tip_height=np.maximum(tip_height, room.lowest_tip_height),
         high_enough=touched & (skin_height >= lowest_object),
         only_target=~met,
         beside_target=table.lookup(strangers & ~table.segmented, stroke).mean(axis=(1, 2)),
@@ -121,5 +118,5 @@ def _transmitted(
     before = np.cumsum(arrived, axis=1) == 0
     other = table.lookup(table.objects, way)
     gaps, through = (table.cell * np.count_nonzero(before & which, axis=1) for which in (~other, other))
-    left = np.clip(1.0 - gaps / d_push, 0.0, 1.0) * pusher.width / (pusher.width + through)
+    left = np.clip(1.0 - gaps / d_push, 0.0, 1.0) * pusher.tool.width / (pusher.tool.width + through)
     return np.where(arrived.any(axis=1), left, 0.0)

@@ -230,7 +230,7 @@ def valid_pushes_of(
     pushes = []
     for n in np.flatnonzero(np.all(list(passed.values()), axis=0)):
         b_W, ahead_W, tip = contacts.b_W[n], direction_W[n], float(contacts.tip_height[n])
-        start_W = b_W - (validity.clearance + pusher.thickness / 2) * ahead_W
+        start_W = b_W - (validity.clearance + pusher.tool.thickness / 2) * ahead_W
         ground = float(table.ground(b_W + np.outer([-1, 1], length * ahead_W)).max())
         push = Push(
             p_WE=np.append(start_W, ground + tip),

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 
-from riseg_drake.robot.tool_shape import Overhang, ToolShape
+from riseg_drake.robot.tool_shape import ToolShape
 
 
 @dataclass
@@ -31,38 +31,3 @@ class Pusher:
     def turned(self) -> "Pusher":
         """The same tool, pushing with its back."""
         return replace(self, tool=self.tool.turned())
-
-    @property
-    def thickness(self) -> float:
-        """Extent of the tip along E's x, the push direction, m."""
-        return self.tool.thickness
-
-    @property
-    def width(self) -> float:
-        """Extent of the tip along E's y, m."""
-        return self.tool.width
-
-    @property
-    def overhangs(self) -> tuple[Overhang, ...]:
-        """What is beside the tip further up, lowest first."""
-        return self.tool.overhangs
-
-    @property
-    def margin(self) -> float:
-        """Room that must be left around the tool, m."""
-        return self.parameters.margin
-
-    @property
-    def tip_height(self) -> float:
-        """Height of the end face above the table during a push, m, where the object is not too low for it."""
-        return self.parameters.tip_height
-
-    @property
-    def lowest_tip_height(self) -> float:
-        """The end face never goes below this height, m."""
-        return self.parameters.lowest_tip_height
-
-    @property
-    def height_share(self) -> float:
-        """The end face is at most at this share of the object's height where it is touched."""
-        return self.parameters.height_share

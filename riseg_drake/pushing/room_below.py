@@ -36,8 +36,8 @@ def room_below_the_tool(
         parameters: how far it goes.
     """
     free = np.ones(len(b_W), bool)
-    tallest, half, margin = float(table.height.max()), pusher.thickness / 2, pusher.margin
-    for overhang in pusher.overhangs:
+    tallest, half, margin = float(table.height.max()), pusher.tool.thickness / 2, pusher.parameters.margin
+    for overhang in pusher.tool.overhangs:
         room = tip_height + overhang.bottom - margin  # [N]
         if tallest <= room.min(initial=np.inf):
             continue

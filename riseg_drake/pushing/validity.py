@@ -81,9 +81,9 @@ def accessible(
     The area is the tip's cross section with its margin all around, the tip's face being `clearance`, m,
     behind b along cb; b [N, 2], m, directions bc [N, 2].
     """
-    margin = pusher.margin
-    along = steps(-clearance - pusher.thickness - margin, -clearance + min(margin, clearance / 2), table)
-    across = steps(-pusher.width / 2 - margin, pusher.width / 2 + margin, table)
+    tool, margin = pusher.tool, pusher.parameters.margin
+    along = steps(-clearance - tool.thickness - margin, -clearance + min(margin, clearance / 2), table)
+    across = steps(-tool.width / 2 - margin, tool.width / 2 + margin, table)
     area = rectangle(b_W, direction_W, along, across)
     occupied: NDArray[np.bool_] = np.any(table.lookup(table.objects, area), axis=(1, 2))
     return ~occupied
