@@ -71,6 +71,8 @@ def triplet_twists(frames: BodyFrames, p_C0S: NDArray) -> Twists:
     V_S = spatial_twist(T_0, T_1)
     K = len(frames)
     sample = np.cov(V_S.T) if K > 1 else np.eye(6)
+    # Fewer than seven span no six dimensions: a touch of noise keeps their distances solvable.
+    sample = sample + 1e-12 * max(np.trace(sample), 1e-12) * np.eye(6)
     return Twists(V_S, np.broadcast_to(sample, (K, 6, 6)), p_C0S, np.ones(K))
 
 

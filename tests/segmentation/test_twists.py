@@ -1,5 +1,7 @@
 """Body frame-invariant features: equal on one rigid body, whatever the frame, near the identity too."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
@@ -7,6 +9,7 @@ from pydrake.multibody.math import SpatialVelocity
 
 from riseg_drake.geometry.se3 import exp_se3, move_points
 from riseg_drake.segmentation.body_frames import BodyFrames
+from riseg_drake.segmentation.grouping import mahalanobis_own, mahalanobis_sample
 from riseg_drake.segmentation.twists import (
     change_space_frame,
     fit_motion,
@@ -46,6 +49,22 @@ def test_all_triplets_on_one_body_have_its_twist(V: np.ndarray) -> None:
     frames = moved_frames(V, np.random.default_rng(0), points=3)
     twists = triplet_twists(frames, np.zeros(3))
     np.testing.assert_allclose(twists.V_S, np.broadcast_to(V, (30, 6)), atol=1e-9)
+
+
+@pytest.mark.parametrize("count", [3, 5, 30])
+def test_triplets_fewer_than_six_dimensions_need_have_distances_by_their_sample(count: int) -> None:
+    rng = np.random.default_rng(3)
+    frames = moved_frames(TWISTS[2], rng, count, points=3)
+    noisy = replace(frames, p_C0Q1=frames.p_C0Q1 + rng.normal(0, 1e-4, frames.p_C0Q1.shape))
+    twists = triplet_twists(noisy, np.zeros(3))
+    # Each of a pair has the sample's covariance: the pair's difference has it twice.
+    own = mahalanobis_own(twists.V_S, twists.covariance)
+    np.testing.assert_allclose(np.sqrt(2) * own, mahalanobis_sample(twists.V_S), rtol=1e-2, atol=1e-6)
+
+
+def test_triplets_that_move_alike_to_the_last_digit_are_no_distance_apart() -> None:
+    twists = triplet_twists(moved_frames(np.zeros(6), np.random.default_rng(4), 5, points=3), np.zeros(3))
+    np.testing.assert_allclose(mahalanobis_own(twists.V_S, twists.covariance), 0, atol=1e-3)
 
 
 @pytest.mark.parametrize("V", TWISTS)
