@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from riseg_drake.geometry.camera import Intrinsics, rays
 from riseg_drake.geometry.rgbd import Frame
+from tests.segmentation.drawn_scene import between_planes
 
 VGA = Intrinsics(640, 480, 570.3, 570.3, 319.5, 239.5)
 FLOOR = -0.72
@@ -38,16 +39,15 @@ class Solid:
         ray = ray_W @ self.X_WB[:3, :3] / half
         with np.errstate(divide="ignore", invalid="ignore"):
             if self.kind == "box":
-                t = np.sort(np.stack([(-1 - eye) / ray, (1 - eye) / ray]), axis=0)
-                enter, leave = t[0].max(-1), t[1].min(-1)
+                enter, leave = between_planes(-1 - eye, 1 - eye, ray)
             else:
                 n = 3 if self.kind == "ball" else 2
                 a, b = (ray[..., :n] ** 2).sum(-1), ray[..., :n] @ eye[:n]
                 root = np.sqrt(b**2 - a * (eye[:n] @ eye[:n] - 1))
                 enter, leave = (-b - root) / a, (-b + root) / a
                 if self.kind == "cylinder":
-                    z = np.sort(np.stack([(-1 - eye[2]) / ray[..., 2], (1 - eye[2]) / ray[..., 2]]), axis=0)
-                    enter, leave = np.maximum(enter, z[0]), np.minimum(leave, z[1])
+                    above, below = between_planes(-1 - eye[2:], 1 - eye[2:], ray[..., 2:])
+                    enter, leave = np.maximum(enter, above), np.minimum(leave, below)
         return np.where((enter < leave) & (enter > 0), enter, np.inf)
 
 

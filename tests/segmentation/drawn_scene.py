@@ -184,7 +184,15 @@ def _enter_box(size: NDArray, X_WB: NDArray, eye_W: NDArray, ray_W: NDArray) -> 
     eye_B = (eye_W - X_WB[:3, 3]) @ X_WB[:3, :3]
     ray_B = ray_W @ X_WB[:3, :3]
     lower, upper = np.array([-size[0] / 2, -size[1] / 2, 0.0]), np.array([size[0] / 2, size[1] / 2, size[2]])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = np.sort(np.stack([(lower - eye_B) / ray_B, (upper - eye_B) / ray_B]), axis=0)
-    enter, leave = t[0].max(-1), t[1].min(-1)
+    enter, leave = between_planes(lower - eye_B, upper - eye_B, ray_B)
     return np.where((enter < leave) & (enter > 0), enter, np.inf)
+
+
+def between_planes(lower: NDArray, upper: NDArray, ray: NDArray) -> tuple[NDArray, NDArray]:
+    """Where rays [H, W, n] from the origin enter and leave what is between two planes across each axis [n]."""
+    enter, leave = np.full(ray.shape[:2], -np.inf), np.full(ray.shape[:2], np.inf)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for axis in range(ray.shape[2]):
+            a, b = lower[axis] / ray[..., axis], upper[axis] / ray[..., axis]
+            enter, leave = np.maximum(enter, np.minimum(a, b)), np.minimum(leave, np.maximum(a, b))
+    return enter, leave
