@@ -29,8 +29,6 @@ _BOUNDARY = np.ones((5, 5), np.uint8)
 """Two pixels on each side of an outline are blurred, interpolated across it, or without true depth."""
 _PINHOLE = np.ones((3, 3), np.uint8)
 """A larger hole in depth is mostly an outline's."""
-THINNED = 0.5
-"""Share of its points with which a keyframe is compared with frames in motion."""
 _THERE = 0.015
 """m; what is seen within that of where it is drawn may be it."""
 
@@ -114,19 +112,6 @@ class Keyframe(Immutable):
     def share_of_points(self, which: NDArray[np.intp]) -> NDArray[np.float64]:
         """Of each superpixel's points the share [N] that is among some of them, by their numbers."""
         return np.bincount(self.owner.take(which), minlength=self.count) / np.maximum(self.point_count, 1)
-
-    @cached_property
-    def thinned(self) -> "Keyframe":
-        """The same with THINNED of its points: those of every second row."""
-        kept = np.flatnonzero(self.points.pixel[0] % 2 == 0)
-        return replace(
-            self,
-            points=self.points.subset(kept),
-            owner=self.owner[kept],
-            gray=self.gray[kept],
-            variance=self.variance[kept],
-            gradient_squared=self.gradient_squared[kept],
-        )
 
     @cached_property
     def covered(self) -> NDArray[np.bool_]:

@@ -5,7 +5,7 @@ Residuals are measured in standard deviations of their own noise; how large they
 explained best, tells how far that noise is to be believed.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,11 +54,6 @@ class LikelihoodParameters:
     few things go just where nobody can see them."""
     superpixel_max: float = 4.0
     """Nats that one superpixel may say for a motion against another: its errors are its own."""
-
-    def of_share(self, share: float) -> "LikelihoodParameters":
-        """The same where no more than a `share` of the points is compared: as many fewer have errors alike."""
-        alike = (max(1.0, share * points) for points in (self.correlated_gray, self.correlated_depth))
-        return replace(self, **dict(zip(("correlated_gray", "correlated_depth"), alike, strict=True)))
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from riseg_drake.segmentation.bodies import Bodies, bodies_of, carry_bodies, reb
 from riseg_drake.segmentation.candidates import candidate_motions
 from riseg_drake.segmentation.comparison import Comparison, renewed_view_error
 from riseg_drake.segmentation.frame_pairs import camera_span
-from riseg_drake.segmentation.keyframe import THINNED, Keyframe, seen_again
+from riseg_drake.segmentation.keyframe import Keyframe, seen_again
 from riseg_drake.segmentation.memory import Memory, draw_memory, moved_memory, remember
 from riseg_drake.segmentation.motion_search import (
     MotionSearchParameters,
@@ -87,13 +87,6 @@ class _Look:
         """I_t."""
         return self.pair.current
 
-    @property
-    def thinned(self) -> "_Look":
-        """The same for a keyframe with fewer points: frames in motion are many, and decide nothing."""
-        observation = self.parameters.observation
-        observation = replace(observation, likelihood=observation.likelihood.of_share(THINNED))
-        return replace(self, parameters=replace(self.parameters, observation=observation))
-
 
 def segment_by_evidence(
     before: Segmentation,
@@ -121,7 +114,7 @@ def segment_by_evidence(
     belief, bodies = now.belief, _bodies_before(now)
     assert belief is not None
     # The camera N of the keyframe, or of what looked more as it does now: motions are told as it sees them.
-    compared = _compared(now, _nearest_view(now, frame).thinned, look)
+    compared = _compared(now, _nearest_view(now, frame), look)
     X_NK = inverse(compared.keyframe.frame.X_WC) @ belief.keyframe.frame.X_WC
     candidates_N = candidate_motions(
         compared,
@@ -141,10 +134,10 @@ def segment_by_evidence(
     )
     if not deciding and now.still_since is None and frame.time - now.searched >= parameters.search_every:
         now = replace(now, searched=frame.time)
-        missing_N = missing_motion(_problem(belief, compared, look.thinned), candidates_N)
+        missing_N = missing_motion(_problem(belief, compared, look), candidates_N)
         candidates_N = np.concatenate([candidates_N, missing_N])
     if len(candidates_N) and not deciding:
-        seen, bodies = _explained(belief, compared, candidates_N, bodies, look.thinned.parameters)
+        seen, bodies = _explained(belief, compared, candidates_N, bodies, parameters)
         deciding = _has_gone_far(now, look, seen, bodies)
     # What the next keyframe cannot be compared with any more is looked for now.
     leaves = bool(above_1.mask.any()) and _leaves_keyframe(now, bodies, look)

@@ -9,7 +9,7 @@ import pytest
 from riseg_drake.geometry.camera import rays
 from riseg_drake.geometry.se3 import move_points
 from riseg_drake.segmentation.above_table import AboveTable, AboveTableParameters, objects_above_table
-from riseg_drake.segmentation.keyframe import THINNED, Keyframe, KeyframeParameters, make_keyframe, seen_again
+from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe, seen_again
 from riseg_drake.segmentation.noise import MeasurementNoise, gray_variance
 from tests.segmentation.drawn_scene import DrawnScene, looking_down, planar
 
@@ -51,20 +51,6 @@ def test_they_are_about_as_large_as_they_shall_be_on_the_object(keyframe, boxes)
     assert np.sqrt(np.median(keyframe.area)) == pytest.approx(pixels, rel=0.25)
     finer = make_keyframe(frame, above, NOISE, KeyframeParameters(superpixel=0.003))
     assert finer.count > 2.5 * keyframe.count
-
-
-def test_thinned_it_has_the_points_of_every_second_row_and_is_cut_as_it_was(keyframe):
-    thinned = keyframe.thinned
-    assert len(thinned.points) == pytest.approx(THINNED * len(keyframe.points), rel=0.02)
-    assert not (thinned.points.pixel[0] % 2).any()
-    v, u = thinned.points.pixel
-    label = keyframe.image_of(np.arange(keyframe.count), -1)
-    np.testing.assert_array_equal(thinned.owner, label[v, u])
-    np.testing.assert_array_equal(thinned.gray, keyframe.frame.gray[v, u])
-    np.testing.assert_array_equal(thinned.gradient_squared, keyframe.frame.gradient_squared[v, u])
-    np.testing.assert_array_equal(thinned.variance, gray_variance(keyframe.frame.gradient_squared, NOISE)[v, u])
-    np.testing.assert_array_equal(thinned.point_count, np.bincount(label[v, u], minlength=keyframe.count))
-    assert thinned.superpixels is keyframe.superpixels
 
 
 def test_what_a_metre_is_in_pixels_is_told_by_how_far_things_are(keyframe, boxes):

@@ -45,26 +45,6 @@ def test_depth_counts_by_how_many_points_its_noise_is_alike_in(plate: tuple[Keyf
         np.testing.assert_allclose(costs(keyframe, nearer, correlated_depth=correlated), expected, rtol=1e-3)
 
 
-def test_fewer_points_have_errors_alike_and_say_as_much(plate: tuple[Keyframe, Frame]) -> None:
-    given = LikelihoodParameters(correlated_gray=3.0, correlated_depth=14.0, superpixel_max=1e6)
-    half = given.of_share(0.5)
-    assert (half.correlated_gray, half.correlated_depth) == (1.5, 7.0)
-    assert half == replace(given, correlated_gray=1.5, correlated_depth=7.0)
-    assert given.of_share(0.1).correlated_gray == 1.0  # no point is less than itself
-    # A step to the side of a plate that is 2 mm nearer: both say the same of it, all of the points and half.
-    keyframe, frame = plate
-    nearer = replace(frame, depth=frame.depth - np.float32(0.002))
-    sinks = np.eye(4)
-    sinks[2, 3] = -0.002
-    said = []
-    for view, parameters in ((keyframe, given), (keyframe.thinned, half)):
-        compared = Comparison(view, nearer, DEPTH_NOISE, view_error=0.0)
-        costs_K = motion_costs(compared, np.stack([np.eye(4), sinks]), parameters)
-        said.append(costs_K.nats(parameters)[0].sum())
-    assert said[0] > 10
-    assert said[1] == pytest.approx(said[0], rel=0.05)
-
-
 def test_where_no_depth_is_it_costs_what_a_match_does(plate: tuple[Keyframe, Frame]) -> None:
     keyframe, frame = plate
     np.testing.assert_allclose(costs(keyframe, replace(frame, depth=np.zeros_like(frame.depth))), 1, atol=1e-3)
