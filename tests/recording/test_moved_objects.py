@@ -163,6 +163,6 @@ def test_a_camera_in_a_hand_finds_nothing_where_nothing_moves_whatever_is_wrong_
         noise=(0.001, 0.05), drift=(0.005, 0.3), hand_eye=(0.005, 0.5), blur=0.015, late=0.01, exposure=0.15
     )
     replay = Replay(Scenario(), FrameView(DRAWN_VGA, None, None), seed=0)
-    for frame in hand_held_film(table, boxes, wrong, frames=8, seed=0):
+    for frame in hand_held_film(table, boxes, wrong, frames=12, seed=0):
         assert not replay.mask_after(frame).any()
     assert replay.segmentation.object_ids == ()
