@@ -39,11 +39,6 @@ def moved_objects(
     }
 
 
-def all_moved(by_frame: Mapping[float, Iterable[int]]) -> set[int]:
-    """The ids of what had moved in any frame of an interaction."""
-    return set().union(*by_frame.values())
-
-
 def overlap_f_of(moved: Iterable[int], mask: NDArray, labels: NDArray) -> float:
     """Mean Overlap F, in [0, 1], of the moved objects in one mask [H, W] with its true labels [H, W]; NaN
     with none in sight.
@@ -59,6 +54,25 @@ def in_motion(overlap_f: Sequence[float], at_rest_f: float) -> InMotion | None:
     """
     seen = [f for f in overlap_f if not np.isnan(f)]
     return InMotion(len(seen), float(np.mean(seen)), at_rest_f) if seen else None
+
+
+class FramesInMotion:
+    """The frames in motion of one interaction, scored as they come."""
+
+    def __init__(self) -> None:
+        self.moved: dict[float, set[int]] = {}
+        """By the time of each frame, s, the true ids of what had moved."""
+        self._overlap_f: list[float] = []
+
+    def score(self, time: float, moved: Iterable[int], mask: NDArray, labels: NDArray) -> None:
+        """Take in the mask [H, W] of one frame, with its true labels [H, W]."""
+        self.moved[time] = set(moved)
+        self._overlap_f.append(overlap_f_of(self.moved[time], mask, labels))
+
+    def closed(self, mask: NDArray, labels: NDArray) -> InMotion | None:
+        """Their figures, once the frame at rest that ends the interaction is known; None where none counts."""
+        ever = set[int]().union(*self.moved.values())
+        return in_motion(self._overlap_f, overlap_f_of(ever, mask, labels))
 
 
 def in_motion_of_steps(

@@ -179,7 +179,6 @@ def _scene_section(scenes: Sequence[SceneResult], last_step: int) -> str:
         last = carried(scene.scores, last_step)[-1]
         picture = f"[{scene.name}]({scene.name}/step_{scene.interactions}/overlay.png)"
         found = "–" if isnan(last.objects_true) else f"{last.objects_found:g} of {last.objects_true:g}"
-        moved = pooled(scene.in_motion)
         figures = [percent(last.overlap_f), percent(last.boundary_f), found]
         rows.append(
             [
@@ -187,7 +186,7 @@ def _scene_section(scenes: Sequence[SceneResult], last_step: int) -> str:
                 str(scene.seed),
                 str(scene.interactions),
                 *figures,
-                "–" if moved is None else percent(moved.overlap_f),
+                percent(_moving_f(scene.in_motion)),
                 scene.failure or scene.end,
             ]
         )
@@ -211,21 +210,22 @@ def ablation_section(scenes: Sequence[SceneResult], last_step: int) -> str:
     if not switches:
         return ""
     ours = [scene.scores for scene in scenes]
-    moved = [_moving_f(scene.in_motion) for scene in scenes]
-    rows = [[f"**{OURS}**", *score_cells(step_means(ours, last_step)[-1]), "", _mean_cell(moved), ""]]
+    moved = [scene.in_motion for scene in scenes]
+    rows = [[f"**{OURS}**", *score_cells(step_means(ours, last_step)[-1]), "", _in_motion_cell(moved), ""]]
     for switch, scores in switches.items():
         at_rest = [
             carried(other, last_step)[-1].overlap_f - carried(own, last_step)[-1].overlap_f
             for other, own in zip(scores, ours, strict=True)
         ]
-        other_moved = [_moving_f(scene.ablation_in_motion.get(switch, ())) for scene in scenes]
+        other_moved = [scene.ablation_in_motion.get(switch, ()) for scene in scenes]
+        moving = [_moving_f(other) - _moving_f(own) for other, own in zip(other_moved, moved, strict=True)]
         rows.append(
             [
                 switch,
                 *score_cells(step_means(scores, last_step)[-1]),
                 _difference(at_rest),
-                _mean_cell(other_moved),
-                _difference(np.subtract(other_moved, moved)),
+                _in_motion_cell(other_moved),
+                _difference(moving),
             ]
         )
     return (
@@ -251,10 +251,10 @@ def _moving_f(interactions: Sequence[InMotion | None]) -> float:
     return float("nan") if figures is None else figures.overlap_f
 
 
-def _mean_cell(shares: Sequence[float]) -> str:
-    """The mean over those that are known, in percent."""
-    known = [share for share in shares if not isnan(share)]
-    return percent(float(np.mean(known))) if known else "–"
+def _in_motion_cell(scenes: Sequence[Sequence[InMotion | None]]) -> str:
+    """The mean over the scenes where something moved in sight, in percent."""
+    _, mean = mean_over_scenes(scenes)
+    return "–" if mean is None else percent(mean.overlap_f)
 
 
 def _difference(of_scenes: Iterable[float]) -> str:

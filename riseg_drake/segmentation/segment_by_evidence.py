@@ -256,6 +256,7 @@ def _carried(
         for a in np.unique(bodies.body[(bodies.body > 0) & (bodies.motion > 0)])
     }
     remembered = draw_memory(moved_memory(now.memory, moves, X_WK), frame)
+    # Frames in motion are many, and decide nothing: there every second row and column must do.
     every = 2 if now.still_since is None else 1
     label = carry_bodies(belief, bodies, frame, above, remembered, every)
     kept = {s: b for s, b in now.bodies.items() if s >= pair.reference.sequence}

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.segment.replay import Replay
 from riseg_drake.app.segmentation_block import panda_view
-from riseg_drake.evaluation.in_motion import InMotion, all_moved, in_motion, overlap_f_of
+from riseg_drake.evaluation.in_motion import FramesInMotion, InMotion
 from riseg_drake.evaluation.scores import Scores, score
 from riseg_drake.recording.layout import RecordedFrame, RecordingError
 from riseg_drake.recording.reader import RecordingReader
@@ -118,14 +118,13 @@ def ablate(scenario: Scenario, seed: int, recording: Path, steps: Sequence[Recor
     }
     alive = dict(scored)
     failures: dict[str, str] = {}
-    wanted = list(steps)
+    ends = {_stamp(step.time) for step in steps}
+    moved = {_stamp(time): ids for step in steps for time, ids in step.moved.items()}
     for frame in RecordingReader(recording):
-        if not wanted:
+        if not ends:
             break
-        time, step = _stamp(frame.time), wanted[0]
-        moved = {_stamp(t): ids for t, ids in step.moved.items()}.get(time)
-        rests = time == _stamp(step.time)
-        labels = _labels(frame, recording) if rests or moved is not None else None
+        time = _stamp(frame.time)
+        labels = _labels(frame, recording) if time in ends or time in moved else None
         for name, version in list(alive.items()):
             try:
                 mask = version.replay.mask_after(frame)
@@ -133,14 +132,13 @@ def ablate(scenario: Scenario, seed: int, recording: Path, steps: Sequence[Recor
                 failures[name] = " ".join(str(error).split())
                 del alive[name]
                 continue
-            if labels is not None and moved is not None:
-                version.meet(mask, labels, moved)
-            if labels is not None and rests:
-                version.close(mask, labels, all_moved(step.moved))
-        if rests:
-            wanted.pop(0)
-    if wanted:
-        raise RecordingError(f"{recording} has no frame at {wanted[0].time} s")
+            if labels is not None and time in moved:
+                version.frames.score(time, moved[time], mask, labels)
+            if labels is not None and time in ends:
+                version.close(mask, labels)
+        ends.discard(time)
+    if ends:
+        raise RecordingError(f"{recording} has no frame at {min(ends)} s")
     return Ablation(
         scores={name: version.scores for name, version in scored.items()},
         in_motion={name: version.in_motion[1:] for name, version in scored.items()},  # step 0 is no interaction
@@ -153,19 +151,16 @@ class _Version:
 
     def __init__(self, replay: Replay):
         self.replay = replay
+        self.frames = FramesInMotion()
+        """Since the last step."""
         self.scores: list[Scores] = []
         self.in_motion: list[InMotion | None] = []
-        self._overlap_f: list[float] = []
 
-    def meet(self, mask: NDArray, labels: NDArray, moved: Collection[int]) -> None:
-        """Score a frame in motion, of what has moved."""
-        self._overlap_f.append(overlap_f_of(moved, mask, labels))
-
-    def close(self, mask: NDArray, labels: NDArray, moved: Collection[int]) -> None:
-        """Score the frame at rest that ends a step; `moved` is what has in any frame of it."""
+    def close(self, mask: NDArray, labels: NDArray) -> None:
+        """Score the frame at rest that ends a step."""
         self.scores.append(score(mask, labels))
-        self.in_motion.append(in_motion(self._overlap_f, overlap_f_of(moved, mask, labels)))
-        self._overlap_f = []
+        self.in_motion.append(self.frames.closed(mask, labels))
+        self.frames = FramesInMotion()
 
 
 def _stamp(time: float) -> float:

@@ -8,11 +8,11 @@ scene_003/
 """
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from riseg_drake.app.evaluate.ablation import versions
 from riseg_drake.app.output import RECORDING
@@ -27,6 +27,8 @@ from riseg_drake.recording.whole_file import write_text
 
 BASELINE_FILE = "baselines.json"
 ABLATION_FILE = "ablation.json"
+
+Figures = TypeVar("Figures")
 
 
 @dataclass(frozen=True)
@@ -174,19 +176,20 @@ def _number(value: float | None) -> float:
 
 def _scores_from_json(content: Any) -> dict[str, list[Scores]]:
     """The scores of each method whose entry can be read."""
-    scores = {}
-    for name, steps in content.items() if isinstance(content, Mapping) else ():
-        with suppress(*_DAMAGED):
-            scores[name] = [Scores.from_dict(each) for each in steps]
-    return scores
+    return _by_name(content, Scores.from_dict)
 
 
 def _in_motion_from_json(content: Any) -> dict[str, list[InMotion | None]]:
     """The masks in motion of each version whose entry can be read."""
+    return _by_name(content, _in_motion)
+
+
+def _by_name(content: Any, read: Callable[[Any], Figures]) -> dict[str, list[Figures]]:
+    """The figures of every name whose entry can be read."""
     figures = {}
-    for name, interactions in content.items() if isinstance(content, Mapping) else ():
+    for name, entries in content.items() if isinstance(content, Mapping) else ():
         with suppress(*_DAMAGED):
-            figures[name] = [_in_motion(each) for each in interactions]
+            figures[name] = [read(each) for each in entries]
     return figures
 
 

@@ -13,7 +13,7 @@ from pydrake.systems.framework import Context, EventStatus
 from riseg_drake.app.diagram import WiredDiagram
 from riseg_drake.app.output import Step
 from riseg_drake.evaluation.disturbance import Disturbance, motion_between, object_at
-from riseg_drake.evaluation.in_motion import all_moved, in_motion, moved_objects, overlap_f_of
+from riseg_drake.evaluation.in_motion import FramesInMotion, moved_objects
 from riseg_drake.evaluation.scores import score
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pushing.arm_path import ArmPhase
@@ -210,8 +210,7 @@ class _Book:
         self._before: dict[str, NDArray] = {}  # and before the one that is under way,
         self._pushed: str | None = None  # and what that one pushes
         self._seen: _Seen | None = None
-        self._overlap_f: list[float] = []  # of the moved objects in each frame since then
-        self._moved: dict[float, set[int]] = {}  # which they are, by the frame's time
+        self._in_motion = FramesInMotion()  # since then
 
     @property
     def has_seen(self) -> bool:
@@ -235,8 +234,7 @@ class _Book:
         """Score what has moved in this interaction. Labels are drawn only where there is such a thing."""
         moved = moved_objects(self._before, truth.poses, truth.names)
         if moved:
-            self._moved[time] = moved
-            self._overlap_f.append(overlap_f_of(moved, self._wired.mask(self._context), truth.labels))
+            self._in_motion.score(time, moved, self._wired.mask(self._context), truth.labels)
 
     def close(self, interaction_step: int) -> Step:
         """The step that ends with the last frame at rest; the count starts anew."""
@@ -259,15 +257,13 @@ class _Book:
             disturbance=None
             if self._start is None or truth is None
             else Disturbance(self._pushed, motion_between(self._start, self._before, truth.poses, truth.axes)),
-            in_motion=in_motion(self._overlap_f, overlap_f_of(all_moved(self._moved), mask, truth.labels))
-            if truth
-            else None,
-            moved={time: sorted(ids) for time, ids in self._moved.items()},
+            in_motion=self._in_motion.closed(mask, truth.labels) if truth else None,
+            moved={time: sorted(ids) for time, ids in self._in_motion.moved.items()},
         )
         if truth is not None:
             self._start, self._before = self._start or truth.poses, truth.poses
         self._pushed = self._next_pushed(frame, truth) if truth else None
-        self._frames, self._seen, self._overlap_f, self._moved = 0, None, [], {}
+        self._frames, self._seen, self._in_motion = 0, None, FramesInMotion()
         self._clock.seconds.clear()
         return step
 
