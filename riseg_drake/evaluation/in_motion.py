@@ -65,12 +65,13 @@ class FramesInMotion:
         self._overlap_f: list[float] = []
 
     def score(self, time: float, moved: Iterable[int], mask: NDArray, labels: NDArray) -> None:
-        """Take in the mask [H, W] of one frame, with its true labels [H, W]."""
+        """Take in the mask [H, W] of the frame of a `time`, s, with its true labels [H, W]."""
         self.moved[time] = set(moved)
         self._overlap_f.append(overlap_f_of(self.moved[time], mask, labels))
 
     def closed(self, mask: NDArray, labels: NDArray) -> InMotion | None:
-        """Their figures, once the frame at rest that ends the interaction is known; None where none counts."""
+        """Their figures, once the frame at rest that ends the interaction has its mask [H, W] and true labels
+        [H, W]; None where none counts."""
         ever = set[int]().union(*self.moved.values())
         return in_motion(self._overlap_f, overlap_f_of(ever, mask, labels))
 
