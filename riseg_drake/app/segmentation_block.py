@@ -12,6 +12,7 @@ from riseg_drake.systems.bfif_grouper import BFIFGrouper
 from riseg_drake.systems.camera_motion import CameraMotion
 from riseg_drake.systems.expected_flow import ExpectedFlow
 from riseg_drake.systems.frame_pair import FramePairMemory
+from riseg_drake.systems.frame_reducer import FrameReducer
 from riseg_drake.systems.frame_view import FrameView
 from riseg_drake.systems.mask_propagator import MaskPropagator
 from riseg_drake.systems.objects_above_table import ObjectsAboveTable
@@ -71,7 +72,10 @@ def add_stages(
 ) -> SegmentationBlock:
     """Add Alg. 2 to a builder, for any camera; it gives an image every `period` s."""
     builder.AddSystem(view)
+    reducer = builder.AddSystem(FrameReducer(scenario.segment_objs.width))
     above = builder.AddSystem(ObjectsAboveTable(scenario.above_table))
+    # Of all pixels, for who reads it: at rests.
+    whole_above = builder.AddNamedSystem("WholeObjectsAboveTable", ObjectsAboveTable(scenario.above_table))
     memory = builder.AddSystem(
         FramePairMemory(period, FRAME_OFFSET, scenario.frame_pair, scenario.camera_motion)
     )
@@ -87,7 +91,9 @@ def add_stages(
         for target in targets:
             builder.Connect(source.GetOutputPort(name), target.GetInputPort(port or name))
 
-    wire(view, "frame", above, memory)
+    wire(view, "frame", reducer)
+    wire(reducer, "frame", above, memory)
+    wire(memory, "whole_frame", whole_above, port="frame")
     wire(above, "above_table", memory)
     wire(memory, "pair", optical, motion)
     wire(optical, "optical_flow", motion)
@@ -100,12 +106,12 @@ def add_stages(
     wire(memory, "above_table_reference", optical, grouper, port="above_table")
     wire(memory, "above_table_reference", propagator)
     wire(memory, "above_table", propagator)
+    wire(whole_above, "above_table", propagator, port="whole_above_table")
     wire(grouper, "groups", propagator)  # lines 3 to 6, and 7
     wire(grouper, "flow_span", memory)
 
     outputs = {
-        "pair": memory,
-        "above_table": memory,
+        "above_table": whole_above,
         "expected_flow": expected,
         "optical_flow": optical,
         "groups": grouper,
@@ -116,9 +122,12 @@ def add_stages(
         "segmentation": propagator,
     }
     return SegmentationBlock(
-        stages=[view, above, memory, motion, expected, optical, grouper, propagator],
+        stages=[view, reducer, above, whole_above, memory, motion, expected, optical, grouper, propagator],
         inputs={port.get_name(): port for port in map(view.get_input_port, range(view.num_input_ports()))},
-        outputs={name: system.GetOutputPort(name) for name, system in outputs.items()},
+        outputs={
+            "pair": memory.GetOutputPort("whole_pair"),
+            **{name: system.GetOutputPort(name) for name, system in outputs.items()},
+        },
     )
 
 

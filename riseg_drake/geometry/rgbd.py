@@ -1,6 +1,6 @@
 """What the algorithm sees at one moment: I_t with the kinematics that belong to it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
@@ -45,6 +45,20 @@ class Frame(Immutable):
     """[H, W], the pixels that the robot itself covers."""
     gain: float = 1.0
     """What gray values are multiplied with, so that frames of different exposure can be compared."""
+    source: "Frame | None" = None
+    """What this was reduced from, as it came from the camera; None if it is that."""
+
+    @cached_property
+    def whole(self) -> "Frame":
+        """The frame in all pixels that the camera gave; itself if it was not reduced."""
+        if self.source is None:
+            return self
+        return replace(self.source, sequence=self.sequence, time=self.time, X_WC=self.X_WC, gain=self.gain)
+
+    @property
+    def reduction(self) -> int:
+        """Pixels of the whole frame to one of this, along a row."""
+        return self.whole.intrinsics.width // self.intrinsics.width
 
     @cached_property
     def gray(self) -> NDArray[np.float32]:
@@ -96,6 +110,11 @@ class FramePair(Immutable):
     span: float = 0.0
     """Effective flow that the reference and the frame before `current` turned out to span, pixels: so far
     had things moved."""
+
+    @cached_property
+    def whole(self) -> "FramePair":
+        """The same in all pixels that the camera gave; `residual` and `span` are still those of this pair."""
+        return replace(self, reference=self.reference.whole, current=self.current.whole)
 
     @property
     def X_C1C0(self) -> NDArray[np.float64]:

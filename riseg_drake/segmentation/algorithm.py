@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.geometry.reduction import reduced
 from riseg_drake.geometry.rgbd import NO_PAIR, Frame, FramePair, Immutable
 from riseg_drake.segmentation.above_table import AboveTable, AboveTableParameters, objects_above_table
 from riseg_drake.segmentation.bfif import BFIFParameters, group_body_frames, no_groups
@@ -32,19 +33,24 @@ class SegmentObjsParameters:
     bfif: BFIFParameters = field(default_factory=BFIFParameters)
     segment: SegmentParameters = field(default_factory=SegmentParameters)
 
+    @property
+    def width(self) -> int:
+        """Pixels to a row of the frames that are worked with in motion; the literal paper's are whole: 0."""
+        return 0 if self.segment.method == "paper" else self.frame_pair.width
+
 
 @dataclass(frozen=True)
 class SegmentedFrame(Immutable):
     """What Alg. 2 made of a frame, and all that it needs for the next one."""
 
     remembered: RememberedPair
-    """The frames of t-1 and t as they came, and objMask of both."""
+    """The frames of t-1 and t, reduced, with their poses as they came, and objMask of both."""
     pair: FramePair
     """The same with what of their poses can be believed."""
     expected_flow: NDArray[np.float32]
-    """E_t [H, W, 2], pixels."""
+    """E_t [h, w, 2], pixels of the reduced frame."""
     optical_flow: NDArray[np.float32]
-    """O_t [H, W, 2], pixels."""
+    """O_t [h, w, 2], pixels of the reduced frame."""
     groups: BFIFGroups
     """G_t."""
     segmentation: Segmentation
@@ -93,6 +99,7 @@ def segment_objs(
     Raises:
         NoPlaneError: no table in the frame.
     """
+    frame = reduced(frame, parameters.width)
     above = objects_above_table(frame, parameters.above_table)
     remembered = with_frame(
         before.remembered,
@@ -116,6 +123,12 @@ def segment_objs(
     # Lines 3 to 6: X_t, body frames, their twists, and groups of these.
     rng = np.random.default_rng([seed, pair.current.sequence])
     G_t = group_body_frames(pair, E_t, O_t, above_0, bfif, rng)
+
+    def see_whole() -> AboveTable:
+        return above if frame.source is None else objects_above_table(frame.source, parameters.above_table)
+
     # Line 7.
-    L_t = segment(before.segmentation, pair, E_t, O_t, G_t, above_0, above_1, parameters.segment, bfif)
+    L_t = segment(
+        before.segmentation, pair, E_t, O_t, G_t, above_0, above_1, see_whole, parameters.segment, bfif
+    )
     return SegmentedFrame(remembered, pair, E_t, O_t, G_t, L_t)

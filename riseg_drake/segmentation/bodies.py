@@ -83,12 +83,10 @@ def carry_bodies(
     frame: Frame,
     above: AboveTable,
     remembered: NDArray[np.uint16],
-    every: int = 1,
 ) -> NDArray[np.uint16]:
     """[H, W], ids in the view of a frame, UNKNOWN where something stands that has not moved, 0 elsewhere.
 
-    `remembered` [H, W] has ids where things that the keyframe does not see should be now. Where the camera is
-    too near to measure, of `every` so many rows and columns one is drawn.
+    `remembered` [H, W] has ids where things that the keyframe does not see should be now.
     """
     # One label for each body and motion, then one for each remembered id.
     motions = len(bodies.motions_K)
@@ -108,7 +106,7 @@ def carry_bodies(
         return found
     # Too near for the camera to measure: the depth that the keyframe has, moved, must do.
     image = belief.keyframe.image_of((label + 1).astype(np.uint16))
-    drawn, _ = draw_labels(belief.keyframe.frame, frame, image, moves, every)
+    drawn, _ = draw_labels(belief.keyframe.frame, frame, image, moves)
     blind = np.flatnonzero(blind & (drawn > 0))
     found.ravel()[blind] = id_of.take(drawn.ravel().take(blind))
     return found

@@ -18,7 +18,7 @@ from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.surface import seek
 
 _ANOTHER_VIEW = 100.0
-"""Pixels of the camera's motion from which smooth errors of depth are others."""
+"""Pixels of the whole frame by which the camera moves, from which smooth errors of depth are others."""
 _PAIRS = 30.0
 """Over about so many pairs is the view's error measured."""
 _LOST = 0.1
@@ -79,12 +79,12 @@ class Comparison(Immutable):
     @cached_property
     def another_view(self) -> float:
         """How far this is another view, a share: 0 where the camera has not moved, 1 where errors are new."""
-        return min(camera_span(self.keyframe.frame, self.frame) / _ANOTHER_VIEW, 1.0)
+        return min(camera_span(self.keyframe.frame, self.frame.whole) / _ANOTHER_VIEW, 1.0)
 
     @cached_property
     def shift(self) -> float:
         """Pixels by which what stands still seems to have moved."""
-        return self.view_error * self.another_view * _ANOTHER_VIEW
+        return self.view_error * self.another_view * _ANOTHER_VIEW / self.frame.reduction
 
     @cached_property
     def per_variance(self) -> NDArray:

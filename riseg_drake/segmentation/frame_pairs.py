@@ -28,6 +28,9 @@ class FramePairParameters:
     flow_span_share: float = 0.03125
     """Effective flow, as a share of the image's width, after which the reference is renewed: 20 pixels of
     640."""
+    width: int = field(default=320, metadata={"least": 0})
+    """Pixels; a frame is reduced to as few to a row as are not less, for all but what rests decide. 0: it is
+    whole, as in the paper."""
     moving: float = 0.5
     """Effective flow, pixels, from which something moves."""
     camera_span_moving: float = 0.08

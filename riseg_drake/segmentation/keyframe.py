@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import Region, bounding_region
+from riseg_drake.geometry.camera import WHOLE, Region, bounding_region
 from riseg_drake.geometry.nearest import nearest_values
 from riseg_drake.geometry.rgbd import Frame, Immutable
 from riseg_drake.segmentation.above_table import AboveTable
@@ -164,6 +164,18 @@ def make_keyframe(
     )
 
 
+def in_fewer_pixels(
+    keyframe: Keyframe, frame: Frame, above: AboveTable, noise: MeasurementNoise, parameters: KeyframeParameters
+) -> Keyframe:
+    """The keyframe, cut as it is, in the pixels of its own frame after `reduced`; itself if that is whole."""
+    if frame.source is None:
+        return keyframe
+    n = frame.reduction
+    owner = keyframe.image_of(np.arange(keyframe.count), -1)[n // 2 :: n, n // 2 :: n]
+    height, width = frame.depth.shape
+    return _shown(keyframe, frame, owner[:height, :width], above, noise, parameters)
+
+
 def seen_again(
     keyframe: Keyframe, frame: Frame, above: AboveTable, noise: MeasurementNoise, parameters: KeyframeParameters
 ) -> Keyframe:
@@ -177,14 +189,26 @@ def seen_again(
     elsewhere = (frame.depth > 0) & (np.abs(frame.depth - depth) > _THERE)
     owner = np.where(frame.robot | elsewhere, 0, drawn).astype(np.intp) - 1
     completed = replace(frame, depth=np.where(frame.depth > 0, frame.depth, depth))
+    return _shown(keyframe, completed, owner, above, noise, parameters)
+
+
+def _shown(
+    keyframe: Keyframe,
+    frame: Frame,
+    owner: NDArray[np.intp],
+    above: AboveTable,
+    noise: MeasurementNoise,
+    parameters: KeyframeParameters,
+) -> Keyframe:
+    """The keyframe's superpixels where a frame shows them, `owner` [H, W], -1 = none."""
     return replace(
         keyframe,
-        frame=completed,
+        frame=frame,
         above=replace(above, mask=above.mask | (owner >= 0)),
-        region=(slice(None), slice(None)),
+        region=WHOLE,
         superpixels=replace(keyframe.superpixels, label=owner),
         area=np.bincount(owner[owner >= 0], minlength=keyframe.count),
-        **_compared(completed, owner, noise, parameters),
+        **_compared(frame, owner, noise, parameters),
     )
 
 

@@ -61,8 +61,8 @@ class MotionSearchParameters:
 
 _RING = np.ones((13, 13), np.uint8)
 """Six pixels around an outline are looked at: what was free there is free where it went."""
-_ASKED = 3
-"""Bodies at most that are asked what they did, in a frame in motion, until one moves."""
+ASKED = 3
+"""Bodies, the likeliest to have moved, that are asked in turn what they did while something moves."""
 _EDGES_MIN = 25
 """Pixels with a gradient that it takes to sharpen a motion."""
 _BETTER = 0.3
@@ -133,11 +133,12 @@ def search_motions(problem: SearchProblem, proposed_K: NDArray[np.float64]) -> N
     return np.array(search.found).reshape(-1, 4, 4)
 
 
-def missing_motion(problem: SearchProblem, known_K: NDArray[np.float64]) -> NDArray[np.float64]:
+def missing_motion(problem: SearchProblem, known_K: NDArray[np.float64], place: int = 0) -> NDArray[np.float64]:
     """The one motion [0 or 1, 4, 4] that is missed most beside standing still and known ones [G, 4, 4].
 
-    For a frame in motion, of which there are many: few bodies are asked about, with few points, and the best
-    valley alone is gone down. The motion must explain most of what is missed there, `gain_min` nats at least.
+    For a frame in motion, of which there are many: one body is asked about, the likeliest, or that in another
+    `place` after it; with few points, and the best valley alone is gone down. The motion must explain most of
+    what is missed there, `gain_min` nats at least.
     """
     keyframe, parameters, likelihood = problem.compared.keyframe, problem.parameters, problem.likelihood
     gain_min, bodies = problem.gain_min, problem.possible_bodies()
@@ -147,24 +148,25 @@ def missing_motion(problem: SearchProblem, known_K: NDArray[np.float64]) -> NDAr
     least = parameters.step * keyframe.pixels_per_metre
     quick = replace(parameters, best=1, samples=parameters.samples // 3, same_flow=least)
     search = _Search(replace(problem, parameters=quick), known_K)
-    for _ in range(_ASKED):
-        missed = _missed(bodies, search.costs, likelihood)
+    missed = _missed(bodies, search.costs, likelihood)
+    while True:
         # More than a motion's price, for its size: not a sliver, and not a heap of which one thing moves.
         worst = int(((missed - gain_min) / (bodies @ keyframe.area)).argmax())
         body = bodies[worst]
         if 2 * missed[worst] < gain_min:
+            return np.empty((0, 4, 4))
+        if place == 0:
             break
-        motion = search.best_motion(body, np.where(body, 0.0, np.inf))
-        if motion is not None:
-            explained = search.costs.with_motion(motion[2])
-            if 2 * _missed(body[None], explained, likelihood)[0] < missed[worst]:
-                if search.take(motion, body):
-                    break
-                search.costs = explained  # it has moved, by less than counts
+        # What it is a part of, or a part of it, is not another.
         alike = 2 * ((bodies & body) @ keyframe.area) > (bodies | body) @ keyframe.area
-        bodies = bodies[~alike]  # what it is a part of, or a part of it, may have moved
+        bodies, missed, place = bodies[~alike], missed[~alike], place - 1
         if not len(bodies):
-            break
+            return np.empty((0, 4, 4))
+    motion = search.best_motion(body, np.where(body, 0.0, np.inf))
+    if motion is not None:
+        explained = search.costs.with_motion(motion[2])
+        if 2 * _missed(body[None], explained, likelihood)[0] < missed[worst]:
+            search.take(motion, body)
     return np.array(search.found[len(known_K) :]).reshape(-1, 4, 4)
 
 

@@ -66,7 +66,7 @@ def segment_as_in_paper(
         before,
         sequence=pair.current.sequence,
         label=mask,
-        frame=pair.current,
+        seen=pair.current,
         at_reference=(pair.reference.sequence, mask_0),
     )
 

@@ -3,6 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.kernels.message_passing import passed_messages
+
+_SETTLED = 1e-2
+"""Nats; messages that change by less have settled."""
+
 
 class PottsGraph:
     """N nodes and the borders between them, in the order in which messages travel."""
@@ -38,24 +43,22 @@ def potts_labels(
     Args:
         unary: [L, N], cost of each label at each node.
         graph: the nodes and what their borders cost.
-        message: [L, messages] to start from, of a problem much like this one; nothing said yet if None.
+        message: [messages, L] to start from, of a problem much like this one; nothing said yet if None.
         rounds: of message passing, at most.
 
     Returns:
         x, and the messages at the end.
     """
-    message = np.zeros((len(unary), len(graph.source)), np.float32) if message is None else message.copy()
-    belief = unary + np.add.reduceat(message, graph.first, axis=1)
-    for _ in range(rounds):
-        outgoing = belief.take(graph.source, axis=1)
-        outgoing -= message.take(graph.twin, axis=1)
-        outgoing -= outgoing.min(axis=0)
-        np.minimum(outgoing, graph.weight, out=outgoing)
-        # Half a step: messages that all change at once may swing for ever.
-        outgoing -= message
-        outgoing *= np.float32(0.5)
-        message += outgoing
-        belief = unary + np.add.reduceat(message, graph.first, axis=1)
-        if max(outgoing.max(), -outgoing.min()) < 1e-2:
-            break
-    return belief.argmin(0), message
+    if message is None:
+        message = np.zeros((len(graph.source), len(unary)), np.float32)
+    belief, message = passed_messages(
+        np.ascontiguousarray(unary.T, np.float32),
+        graph.source,
+        graph.twin,
+        graph.weight,
+        graph.first,
+        message,
+        rounds,
+        _SETTLED,
+    )
+    return belief.argmin(1), message

@@ -84,26 +84,23 @@ def draw_labels(
     current: Frame,
     label_0: NDArray[np.uint16],
     motion_of: Mapping[int, NDArray[np.float64]],
-    every: int = 1,
 ) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
     """The labels [H, W] of the reference frame drawn into the current one by the depth of the former, and the
     depth [H, W] that they have there, m, 0 where nothing is drawn.
 
     For pixels where the current frame has no depth to look anything up by. `motion_of`: for the labels that
-    moved, the motion [4, 4] in C0. Of `every` so many rows and columns one is drawn.
+    moved, the motion [4, 4] in C0.
     """
     X_C1C0 = inverse(current.X_WC) @ reference.X_WC
-    known = np.zeros(label_0.shape, bool)
-    known[::every, ::every] = label_0[::every, ::every] > 0
-    surface = surface_pixels(known, reference.depth, reference.intrinsics)
+    surface = surface_pixels(label_0 > 0, reference.depth, reference.intrinsics)
     owner = label_0.ravel().take(surface.index)
-    shape = tuple(-(-pixels // every) for pixels in current.intrinsics.shape)
+    shape = current.intrinsics.shape
     places, per_depths, labels = [], [], []
     for moves, motion in _by_motion(motion_of):
         own = np.flatnonzero(moves.take(owner))
         sought = seek(surface.subset(own), X_C1C0 @ motion)
-        inside = np.flatnonzero(sought.inside(current.intrinsics.shape))
-        v, u = (np.rint(x.ravel().take(inside)).astype(np.intp) // every for x in (sought.v, sought.u))
+        inside = np.flatnonzero(sought.inside(shape))
+        v, u = (np.rint(x.ravel().take(inside)).astype(np.intp) for x in (sought.v, sought.u))
         places.append(v * shape[1] + u)
         per_depths.append(1 / sought.depth.take(inside))
         labels.append(owner.take(own.take(inside)))
@@ -120,10 +117,6 @@ def draw_labels(
     drawn = nearest_label(drawn, closed > 0, np.zeros_like(closed), _CLOSE)
     drawn[drawn == UNKNOWN] = 0
     depth = np.divide(1, closed, out=np.zeros_like(closed), where=drawn > 0)
-    if every > 1:
-        whole = tuple(slice(pixels) for pixels in current.intrinsics.shape)
-        drawn = drawn.repeat(every, 0).repeat(every, 1)[whole]
-        depth = depth.repeat(every, 0).repeat(every, 1)[whole]
     return drawn, depth
 
 

@@ -17,7 +17,7 @@ class RestParameters:
     time: float = 0.1
     """s without any change after which it is."""
     camera_span: float = 1.0
-    """Pixels that the camera may move from one frame to the next: joint angles carry noise."""
+    """Pixels of the whole frame that the camera may move from one to the next: joint angles carry noise."""
     sigmas: float = 3.0
     """Standard deviations of the difference of two gray values from which a pixel has changed."""
     share: float = 0.004
@@ -27,15 +27,21 @@ class RestParameters:
 def is_still(
     before: Frame, frame: Frame, above: AboveTable, noise: MeasurementNoise, parameters: RestParameters
 ) -> bool:
-    """Whether two frames, one after the other, show the same."""
-    span = camera_span(before, frame)
+    """Whether two frames, one after the other, show the same.
+
+    In all their pixels, of which a small motion changes more: of what each pixel of a reduced frame covers one is
+    looked at.
+    """
+    whole_0, whole_1, n = before.whole, frame.whole, frame.reduction
+    span = camera_span(whole_0, whole_1)
     if span > parameters.camera_span:
         return False
-    looked_at = np.flatnonzero(above.mask & ~frame.robot & ~before.robot)
-    if not len(looked_at):
+    v, u = np.nonzero(above.mask & ~frame.robot & ~before.robot)
+    if not len(v):
         return True
+    looked_at = n * v + n // 2, n * u + n // 2
     gray_0, gray_1, gradient_squared = (
-        image.ravel().take(looked_at) for image in (before.gray, frame.gray, before.gradient_squared)
+        image[looked_at] for image in (whole_0.gray, whole_1.gray, whole_0.gradient_squared)
     )
     # What the camera's own last creeping does to the image is no motion of things.
     variance = gray_variance(gradient_squared, replace(noise, registration=noise.registration + span))

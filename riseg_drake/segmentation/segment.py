@@ -1,5 +1,6 @@
 """Alg. 2, line 7: the groups G_t and the mask L_t-1 make the mask L_t, by evidence or as the paper has it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -8,9 +9,10 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.bfif import BFIFParameters
+from riseg_drake.segmentation.look import EvidenceParameters
 from riseg_drake.segmentation.motions import BFIFGroups
 from riseg_drake.segmentation.paper import PaperParameters, segment_as_in_paper
-from riseg_drake.segmentation.segment_by_evidence import EvidenceParameters, segment_by_evidence
+from riseg_drake.segmentation.segment_by_evidence import segment_by_evidence
 from riseg_drake.segmentation.segmentation import Segmentation
 
 
@@ -32,6 +34,7 @@ def segment(
     groups: BFIFGroups,
     above_0: AboveTable,
     above_1: AboveTable,
+    see_whole: Callable[[], AboveTable],
     parameters: SegmentParameters,
     bfif: BFIFParameters,
 ) -> Segmentation:
@@ -45,6 +48,7 @@ def segment(
         groups: G_t.
         above_0: objMask at t-1.
         above_1: objMask at t.
+        see_whole: gives objMask at t of the whole frame, for which rests alone ask.
         parameters: see there.
         bfif: what the groups were made with: noise of the measurements, and when two motions are one.
 
@@ -54,7 +58,7 @@ def segment(
     if before.sequence == pair.current.sequence:
         return before
     if parameters.method == "evidence":
-        return segment_by_evidence(before, pair, groups, above_1, parameters.evidence, bfif)
+        return segment_by_evidence(before, pair, groups, above_1, see_whole, parameters.evidence, bfif)
     if parameters.method == "paper":
         return segment_as_in_paper(before, pair, expected_flow, optical_flow, groups, above_0, parameters.paper)
     raise ValueError(f"no method {parameters.method!r} to segment: choose evidence or paper")

@@ -4,88 +4,43 @@ Frames are compared with a keyframe, the picture of the last rest, or with what 
 before anything moved. While something moves, the motions of lines 3 to 6 are chained to what each body has done
 since then, and carry the mask along. At the next rest both pictures are sharp, have depth, and span all that
 happened: that pair decides, its evidence is kept, and its second frame becomes the keyframe.
+
+Frames in motion are many, and decide nothing: they come in fewer pixels, and are compared with the keyframe
+in as few. A rest is looked at in all of them.
 """
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import rays
-from riseg_drake.geometry.rgbd import Frame, FramePair
-from riseg_drake.geometry.se3 import inverse, move_points, seen_from
+from riseg_drake.geometry.reduction import enlarged
+from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.geometry.se3 import inverse, seen_from
 from riseg_drake.segmentation.above_table import AboveTable
-from riseg_drake.segmentation.belief import Belief, BeliefParameters
+from riseg_drake.segmentation.belief import Belief
 from riseg_drake.segmentation.bfif import BFIFParameters
 from riseg_drake.segmentation.bodies import Bodies, bodies_of, carry_bodies, rebased, standing
 from riseg_drake.segmentation.candidates import candidate_motions
 from riseg_drake.segmentation.comparison import Comparison, renewed_view_error
-from riseg_drake.segmentation.frame_pairs import camera_span
-from riseg_drake.segmentation.keyframe import Keyframe, seen_again
+from riseg_drake.segmentation.keyframe import Keyframe, in_fewer_pixels, seen_again
+from riseg_drake.segmentation.look import EvidenceParameters, Look, compared_at_rest, compared_in_motion
 from riseg_drake.segmentation.memory import Memory, draw_memory, moved_memory, remember
-from riseg_drake.segmentation.motion_search import (
-    MotionSearchParameters,
-    SearchProblem,
-    missing_motion,
-    search_motions,
-)
+from riseg_drake.segmentation.motion_search import ASKED, SearchProblem, missing_motion, search_motions
 from riseg_drake.segmentation.motions import BFIFGroups
 from riseg_drake.segmentation.next_keyframe import first_belief, next_belief
-from riseg_drake.segmentation.observation import (
-    Observation,
-    ObservationParameters,
-    motion_price,
-    observe,
+from riseg_drake.segmentation.observation import Observation, motion_price, observe
+from riseg_drake.segmentation.occasions import (
+    has_gone_far,
+    is_worth_another_view,
+    leaves_keyframe,
+    share_in_view,
 )
 from riseg_drake.segmentation.partition import margins
-from riseg_drake.segmentation.propagation import UNKNOWN, pixels_of
-from riseg_drake.segmentation.rest import RestParameters, is_still
+from riseg_drake.segmentation.propagation import UNKNOWN
+from riseg_drake.segmentation.rest import is_still
 from riseg_drake.segmentation.segmentation import Segmentation
-
-_AS_MUCH = 0.5
-"""Share of the area that a keyframe shows, which its successor must show at least."""
-
-
-@dataclass
-class EvidenceParameters:
-    """How line 7 is decided by evidence (not in the paper)."""
-
-    rest: RestParameters = field(default_factory=RestParameters)
-    observation: ObservationParameters = field(default_factory=ObservationParameters)
-    search: MotionSearchParameters = field(default_factory=MotionSearchParameters)
-    belief: BeliefParameters = field(default_factory=BeliefParameters)
-    settled: float = 1.5
-    """Nats a border by which an object's outline must be better than the next best, not to be in doubt."""
-    in_view: float = 0.9
-    """Share of what the keyframe shows that a picture must show, too, to decide: a rest of the arm just after a
-    push sees little."""
-    span: float = 15.0
-    """Pixels that something has moved since the keyframe, from which what is seen in motion decides, too: hands
-    do not rest."""
-    creep: float = 4.0
-    """Pixels from one frame to the next up to which the camera has nearly come to rest, and sees sharply."""
-    uncovered: float = 0.3
-    """Share of what stands there that the keyframe does not show, from which the view needs another."""
-    search_every: float = 0.4
-    """s between two frames in motion in which a motion is looked for that no group proposes: what is blank."""
-    memory: bool = True
-    """Remember objects that leave the view (not in the paper)."""
-
-
-@dataclass(frozen=True)
-class _Look:
-    """What Alg. 2 sees at t, and by what it judges that."""
-
-    pair: FramePair
-    above: AboveTable
-    """objMask at t."""
-    parameters: EvidenceParameters
-    bfif: BFIFParameters
-
-    @property
-    def frame(self) -> Frame:
-        """I_t."""
-        return self.pair.current
 
 
 def segment_by_evidence(
@@ -93,6 +48,7 @@ def segment_by_evidence(
     pair: FramePair,
     groups: BFIFGroups,
     above_1: AboveTable,
+    see_whole: Callable[[], AboveTable],
     parameters: EvidenceParameters,
     bfif: BFIFParameters,
 ) -> Segmentation:
@@ -103,10 +59,11 @@ def segment_by_evidence(
         pair: the frames of t-1 and t.
         groups: G_t.
         above_1: objMask at t.
+        see_whole: gives objMask at t of the whole frame, which rests alone ask for.
         parameters: see there.
         bfif: what the groups were made with: noise of the measurements, and when two motions are one.
     """
-    look, frame = _Look(pair, above_1, parameters, bfif), pair.current
+    look, frame = Look(pair, above_1, see_whole, parameters, bfif), pair.current
     if before.belief is None:
         return _begin(before, look)
     now = _with_rest(before, look)
@@ -114,7 +71,7 @@ def segment_by_evidence(
     belief, bodies = now.belief, _bodies_before(now)
     assert belief is not None
     # The camera N of the keyframe, or of what looked more as it does now: motions are told as it sees them.
-    compared = _compared(now, _nearest_view(now, frame), look)
+    compared = compared_in_motion(now, look)
     X_NK = inverse(compared.keyframe.frame.X_WC) @ belief.keyframe.frame.X_WC
     candidates_N = candidate_motions(
         compared,
@@ -130,52 +87,64 @@ def segment_by_evidence(
         now.still_since is not None
         and not now.decided
         and (frame.time - now.still_since >= parameters.rest.time)
-        and _share_in_view(belief, bodies, frame) > parameters.in_view
+        and share_in_view(belief, bodies, frame) > parameters.in_view
     )
     if not deciding and now.still_since is None and frame.time - now.searched >= parameters.search_every:
-        now = replace(now, searched=frame.time)
-        missing_N = missing_motion(_problem(belief, compared, look), candidates_N)
+        missing_N = missing_motion(_problem(belief, compared, look), candidates_N, now.asked)
+        following = 0 if len(missing_N) else (now.asked + 1) % ASKED
+        now = replace(now, searched=frame.time, asked=following)
         candidates_N = np.concatenate([candidates_N, missing_N])
     if len(candidates_N) and not deciding:
-        seen, bodies = _explained(belief, compared, candidates_N, bodies, parameters)
-        deciding = _has_gone_far(now, look, seen, bodies)
+        moved = bodies.motion > 0
+        seen, bodies = _explained(belief, compared, candidates_N, bodies, parameters, moved)
+        deciding = has_gone_far(now, look, seen, bodies)
     # What the next keyframe cannot be compared with any more is looked for now.
-    leaves = bool(above_1.mask.any()) and _leaves_keyframe(now, bodies, look)
+    leaves = bool(above_1.mask.any()) and leaves_keyframe(now, bodies, look)
     deciding |= leaves
     if deciding:
-        compared = _compared(now, belief.keyframe, look)
+        compared = compared_at_rest(now, look)
         candidates_K = seen_from(inverse(X_NK), candidates_N)
         candidates_K = search_motions(_problem(belief, compared, look), candidates_K)
         if len(candidates_K):
             seen, bodies = _explained(belief, compared, candidates_K, bodies, parameters)
         else:
             bodies = standing(belief)
-    if before.frame is not None and _is_worth_another_view(compared, before.frame, bodies, parameters):
-        near = seen_again(belief.keyframe, frame, above_1, bfif.noise, parameters.belief.keyframe)
-        now = replace(now, near=near)
+    if before.seen is not None and is_worth_another_view(compared, before.seen, bodies, parameters):
+        near = seen_again(now.views[0], frame, above_1, bfif.noise, parameters.belief.keyframe)
+        now = replace(now, views=(now.views[0], near))
     return _carried(now, look, seen, bodies, deciding=deciding, leaves=leaves)
 
 
-def _begin(before: Segmentation, look: _Look) -> Segmentation:
+def _begin(before: Segmentation, look: Look) -> Segmentation:
     """The first keyframe, once something stands on the table."""
-    frame, standing_there = look.frame, look.above.mask
-    belief = None
-    if standing_there.any():
-        belief = first_belief(frame, look.above, look.bfif.noise, look.parameters.belief)
+    frame, noise, parameters = look.frame.whole, look.bfif.noise, look.parameters
+    label, belief = np.zeros(frame.depth.shape, np.uint16), None
+    views: tuple[Keyframe, ...] = ()
+    if look.above.mask.any() and look.whole_above.mask.any():
+        label[look.whole_above.mask] = UNKNOWN
+        belief = first_belief(frame, look.whole_above, noise, parameters.belief)
+        views = _views(belief, look)
     return replace(
         before,
         sequence=frame.sequence,
-        label=np.where(standing_there, UNKNOWN, np.uint16(0)),
+        label=label,
         belief=belief,
-        frame=frame,
-        settled=look.parameters.settled,
+        views=views,
+        seen=look.frame,
+        settled=parameters.settled,
     )
 
 
-def _with_rest(before: Segmentation, look: _Look) -> Segmentation:
+def _views(belief: Belief, look: Look) -> tuple[Keyframe, ...]:
+    """A new keyframe as frames in motion are compared with it."""
+    noise, parameters = look.bfif.noise, look.parameters.belief.keyframe
+    return (in_fewer_pixels(belief.keyframe, look.frame, look.above, noise, parameters),)
+
+
+def _with_rest(before: Segmentation, look: Look) -> Segmentation:
     """Whether anything moves, from the last frame to this one."""
-    assert before.frame is not None
-    if not is_still(before.frame, look.frame, look.above, look.bfif.noise, look.parameters.rest):
+    assert before.seen is not None
+    if not is_still(before.seen, look.frame, look.above, look.bfif.noise, look.parameters.rest):
         return replace(before, still_since=None, decided=False)
     return replace(before, still_since=look.frame.time) if before.still_since is None else before
 
@@ -185,51 +154,29 @@ def _bodies_before(now: Segmentation) -> Bodies:
     return now.bodies[max(now.bodies)] if now.bodies else standing(now.belief)
 
 
-def _nearest_view(now: Segmentation, frame: Frame) -> Keyframe:
-    """The keyframe, by its own frame or as it was seen again, whichever is more like this frame's view."""
-    assert now.belief is not None
-    views = [now.belief.keyframe] if now.near is None else [now.belief.keyframe, now.near]
-    return min(views, key=lambda view: camera_span(view.frame, frame))
-
-
-def _is_worth_another_view(
-    compared: Comparison, before: Frame, bodies: Bodies, parameters: EvidenceParameters
-) -> bool:
-    """Whether nothing has moved yet, and the camera, which hardly moves since the frame `before`, looks from
-    elsewhere than the keyframe did."""
-    creeps = camera_span(before, compared.frame) < parameters.creep
-    return creeps and compared.another_view == 1 and not (bodies.motion > 0).any()
-
-
-def _compared(now: Segmentation, keyframe: Keyframe, look: _Look) -> Comparison:
-    return Comparison(
-        keyframe,
-        look.frame,
-        depth_noise=max(look.above.depth_noise, keyframe.above.depth_noise),
-        view_error=now.view_error.share(look.parameters.observation.likelihood.view_error),
-    )
-
-
 def _explained(
     belief: Belief,
     compared: Comparison,
     candidates_N: NDArray[np.float64],
     before: Bodies,
     parameters: EvidenceParameters,
+    moved: NDArray[np.bool_] | None = None,
 ) -> tuple[Observation, Bodies]:
     """What a frame says, given some motions [C, 4, 4] as the camera that it is compared with sees them, and the
-    bodies by it."""
-    seen = observe(compared, belief.bond, belief.part, belief.shown, candidates_N, parameters.observation)
+    bodies by it; `moved` [N], what had done so in the frame before."""
+    seen = observe(
+        compared, belief.bond, belief.part, belief.shown, candidates_N, parameters.observation, moved
+    )
     X_KN = inverse(belief.keyframe.frame.X_WC) @ compared.keyframe.frame.X_WC
     seen = replace(seen, motions_K=seen_from(X_KN, seen.motions_K))
     return bodies_of(belief, seen, before, parameters.belief, parameters.observation)
 
 
-def _problem(belief: Belief, compared: Comparison, look: _Look) -> SearchProblem:
+def _problem(belief: Belief, compared: Comparison, look: Look) -> SearchProblem:
     parameters = look.parameters
     return SearchProblem(
         compared,
-        look.above,
+        look.above if compared.frame is look.frame else look.whole_above,
         np.vstack([belief.part[None], belief.finer]),
         motion_price(compared, parameters.observation),
         parameters.search,
@@ -240,7 +187,7 @@ def _problem(belief: Belief, compared: Comparison, look: _Look) -> SearchProblem
 
 def _carried(
     now: Segmentation,
-    look: _Look,
+    look: Look,
     seen: Observation | None,
     bodies: Bodies,
     *,
@@ -248,20 +195,27 @@ def _carried(
     leaves: bool,
 ) -> Segmentation:
     """The mask in the view of t, and a new keyframe where it is time for one."""
-    belief, pair, frame, above, parameters = now.belief, look.pair, look.frame, look.above, look.parameters
+    belief, pair, parameters = now.belief, look.pair, look.parameters
     assert belief is not None
     X_WK = belief.keyframe.frame.X_WC
     moves = {
         int(a): bodies.motions_K[bodies.motion[bodies.body == a][0]]
         for a in np.unique(bodies.body[(bodies.body > 0) & (bodies.motion > 0)])
     }
-    remembered = draw_memory(moved_memory(now.memory, moves, X_WK), frame)
-    # Frames in motion are many, and decide nothing: there every second row and column must do.
-    every = 2 if now.still_since is None else 1
-    label = carry_bodies(belief, bodies, frame, above, remembered, every)
+    moved_on = moved_memory(now.memory, moves, X_WK)
+    if deciding or now.still_since is not None:
+        frame, above, drawn = look.frame.whole, look.whole_above, belief
+    else:
+        frame, above, drawn = look.frame, look.above, replace(belief, keyframe=now.views[0])
+    remembered = draw_memory(moved_on, frame)
+    label = carry_bodies(drawn, bodies, frame, above, remembered)
     kept = {s: b for s, b in now.bodies.items() if s >= pair.reference.sequence}
     now = replace(
-        now, sequence=frame.sequence, label=label, frame=frame, bodies={**kept, frame.sequence: bodies}
+        now,
+        sequence=frame.sequence,
+        label=np.where(frame.whole.robot, np.uint16(0), enlarged(label, frame)),
+        seen=look.frame,
+        bodies={**kept, frame.sequence: bodies},
     )
     margin = now.margin
     if deciding and seen is not None:
@@ -281,61 +235,11 @@ def _carried(
     seen_so_far = {pair.reference.sequence: standing(belief), **now.bodies}
     since = {s: rebased(b, bodies, belief.keyframe, following) for s, b in seen_so_far.items()}
     return replace(
-        now, margin=margin, belief=following, near=None, bodies=since, memory=memory, decided=decided
+        now,
+        margin=margin,
+        belief=following,
+        views=_views(following, look),
+        bodies=since,
+        memory=memory,
+        decided=decided,
     )
-
-
-def _has_gone_far(now: Segmentation, look: _Look, seen: Observation, bodies: Bodies) -> bool:
-    """Whether something as large as a body has moved by many pixels since the keyframe, and moves on, before a
-    camera that stands as it stood then: one that moves with the arm will see better at the next rest."""
-    assert now.belief is not None
-    assert now.frame is not None
-    keyframe, parameters = now.belief.keyframe, look.parameters
-    if now.still_since is not None:
-        return False
-    if any(camera_span(f, look.frame) > parameters.rest.camera_span for f in (keyframe.frame, now.frame)):
-        return False
-    far = (bodies.motion > 0) & (seen.span > parameters.span)
-    area_min = parameters.belief.partition.area_min
-    return bool(keyframe.area[far].sum() > area_min * keyframe.pixels_per_metre**2)
-
-
-def _share_in_view(belief: Belief, bodies: Bodies, frame: Frame) -> float:
-    """How much of what the keyframe shows this frame shows with depth, where it should be by now.
-
-    In the measure of the keyframe's own holes, which lie elsewhere in each frame: dark things are seen half.
-    """
-    keyframe = belief.keyframe
-    every = slice(None, None, 1 + len(keyframe.owner) // 2000)
-    v, u = keyframe.points.pixel[:, every]
-    p_KQ = rays(keyframe.frame.intrinsics)[v, u] * keyframe.points.depth[every, None]
-    motion = bodies.motion[keyframe.owner[every]]
-    shown = 0
-    for k, X in enumerate(bodies.motions_K):
-        p_CQ = move_points(inverse(frame.X_WC) @ keyframe.frame.X_WC @ X, p_KQ[motion == k].astype(float))
-        (v, u), inside = (a.T for a in pixels_of(p_CQ, frame.intrinsics))
-        shown += int(np.count_nonzero(frame.unhidden_depth[v[inside], u[inside]] > 0))
-    measured = np.mean(keyframe.frame.depth[keyframe.above.mask] > 0)
-    return shown / max(1.0, len(p_KQ) * float(measured))
-
-
-def _leaves_keyframe(now: Segmentation, bodies: Bodies, look: _Look) -> bool:
-    """Whether too much of what stands there was not to be seen in the keyframe, which shows hardly more than
-    this frame: a camera that is too near to measure most of it will be back. What stands, in motion, where the
-    keyframe saw nothing has moved there: the next rest says how."""
-    assert now.belief is not None
-    frame, every = look.frame, (slice(2, None, 6), slice(2, None, 6))
-    standing_there = look.above.mask[every] & (frame.depth[every] > 0)
-    keyframe = now.belief.keyframe
-    in_keyframe = keyframe.frame.depth[every][keyframe.above.mask[every]]
-    if (frame.depth[every][standing_there] ** 2).sum() <= _AS_MUCH * (in_keyframe**2).sum():
-        return False
-    p_C1Q = (rays(frame.intrinsics)[every] * frame.depth[every][..., None])[standing_there].astype(float)
-    p_KQ = move_points(inverse(keyframe.frame.X_WC) @ frame.X_WC, p_C1Q)
-    shown, covered = keyframe.covered, np.zeros(len(p_KQ), bool)
-    if now.still_since is None:
-        shown = shown | (keyframe.frame.depth > 0)
-    for X in bodies.motions_K:
-        (v, u), inside = (a.T for a in pixels_of(move_points(inverse(X), p_KQ), frame.intrinsics))
-        covered[inside] |= shown[v[inside], u[inside]]
-    return bool(np.mean(~covered) > look.parameters.uncovered)

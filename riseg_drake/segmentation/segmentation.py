@@ -29,24 +29,32 @@ class Segmentation(Immutable):
     """The margin that leaves no doubt."""
     belief: Belief | None = None
     """As of the keyframe; None before anything stood on the table."""
-    near: Keyframe | None = None
-    """The belief's keyframe as it was seen again from a nearer view, before anything moved."""
+    views: tuple[Keyframe, ...] = ()
+    """The belief's keyframe in the pixels that frames in motion are compared in; and, if it was seen again
+    before anything moved, from there."""
     bodies: Mapping[int, Bodies] = field(default_factory=dict)
     """By frame number, since the pair's reference: the bodies, and how they moved since the keyframe."""
-    frame: Frame | None = None
-    """The last one."""
+    seen: Frame | None = None
+    """The last frame, in as few pixels as is worked with in motion."""
     still_since: float | None = None
     """s; None while something moves."""
     decided: bool = True
     """Whether the present rest has been looked at."""
     searched: float = float("-inf")
     """s; when a motion that nothing proposed was looked for."""
+    asked: int = 0
+    """Whose motion is looked for next: its place among the bodies that are likeliest to have moved."""
     view_error: ViewError = field(default_factory=ViewError)
     """What the pairs so far have shown of it."""
     memory: Memory = field(default_factory=dict)
     """Points of objects that the keyframe does not see, as of its time."""
     at_reference: tuple[int, NDArray[np.uint16]] | None = None
     """Number of the pair's reference frame and its label [H, W]: all that the literal paper remembers."""
+
+    @property
+    def frame(self) -> Frame | None:
+        """The last frame, in all its pixels: what `label` is drawn on."""
+        return None if self.seen is None else self.seen.whole
 
     @property
     def mask(self) -> NDArray[np.uint16]:

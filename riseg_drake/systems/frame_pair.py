@@ -27,6 +27,8 @@ class FramePairMemory(LeafSystem):
 
     Outputs:
         pair: FramePair.
+        whole_pair: FramePair, the same in all pixels that the camera gave.
+        whole_frame: Frame, that of t in all its pixels.
         above_table_reference: AboveTable at t-1.
         above_table: AboveTable at t.
         pose_error: PoseError, what the table showed of it so far.
@@ -52,6 +54,8 @@ class FramePairMemory(LeafSystem):
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, offset, self._take_frame)
         for name, read in (
             ("pair", lambda memory: memory.pair),
+            ("whole_pair", lambda memory: NO_PAIR if memory.pair is NO_PAIR else memory.pair.whole),
+            ("whole_frame", lambda memory: memory.pair.current.whole),
             ("above_table_reference", lambda memory: memory.above_0),
             ("above_table", lambda memory: memory.above_1),
             ("pose_error", lambda memory: memory.pose_error),

@@ -30,6 +30,8 @@ class MaskPropagator(LeafSystem):
         groups: BFIFGroups.
         above_table_reference: AboveTable at t-1.
         above_table: AboveTable at t.
+        whole_above_table: the same of the whole frame, which is read at rests alone; to be connected where the
+            pair's frames are reduced.
 
     Outputs:
         mask: L_t [H, W] uint16, 0 = background.
@@ -62,6 +64,7 @@ class MaskPropagator(LeafSystem):
         self._groups = ValueInput(self, "groups", no_groups())
         self._above_0 = ValueInput(self, "above_table_reference", NOTHING_ABOVE_TABLE)
         self._above_1 = ValueInput(self, "above_table", NOTHING_ABOVE_TABLE)
+        self._whole_above_1 = ValueInput(self, "whole_above_table", NOTHING_ABOVE_TABLE)
         nothing = nothing_segmented(intrinsics.shape)
         self._state = self.DeclareAbstractState(AbstractValue.Make(nothing))
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, offset, self._update)
@@ -93,6 +96,7 @@ class MaskPropagator(LeafSystem):
 
     @timed
     def _segment(self, context: Context, state: State, pair: FramePair) -> None:
+        seen_at_rest = self._above_1 if pair.current.source is None else self._whole_above_1
         following = segment(
             self._segmentation(context),
             pair,
@@ -101,6 +105,7 @@ class MaskPropagator(LeafSystem):
             self._groups.Eval(context),
             self._above_0.Eval(context),
             self._above_1.Eval(context),
+            lambda: seen_at_rest.Eval(context),
             self._parameters,
             self._bfif,
         )

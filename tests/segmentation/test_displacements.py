@@ -43,7 +43,7 @@ def segmentation(number, key, by_frame, label=0):
         label=np.full(CAMERA.shape, label, np.uint16),
         belief=SimpleNamespace(keyframe=key),
         bodies=by_frame,
-        frame=frame(number),
+        seen=frame(number),
     )
 
 

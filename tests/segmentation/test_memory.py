@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from riseg_drake.geometry.rgbd import FramePair
+from riseg_drake.segmentation.look import EvidenceParameters
 from riseg_drake.segmentation.memory import draw_memory, moved_memory, remember
 from riseg_drake.segmentation.propagation import UNKNOWN
 from riseg_drake.segmentation.segment import SegmentParameters
-from riseg_drake.segmentation.segment_by_evidence import EvidenceParameters
 from tests.segmentation.drawn_scene import (
     CAMERA,
     DrawnScene,

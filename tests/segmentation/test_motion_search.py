@@ -1,5 +1,6 @@
 """From rest to rest: motions that nobody proposed are found."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -172,9 +173,17 @@ def test_in_motion_nothing_is_found_where_nothing_moves_or_by_less_than_a_step(a
 def test_in_motion_what_has_moved_by_less_than_a_step_keeps_nothing_else_from_being_found():
     # A print 3 mm out of place is missed more than a blank box that has gone 17 mm, and is asked first.
     moved = Moved({0: (-0.085, 0.008, 0.0), 2: (0.0575, 0.011, 0.0)}, BLANK)
-    found = moved.search(search=missing_motion)
-    assert len(found) == 1
-    assert moved.error(0, found) < 2
+    first, second = (moved.search(search=partial(missing_motion, place=place)) for place in (0, 1))
+    assert len(first) == 0
+    assert len(second) == 1
+    assert moved.error(0, second) < 2
+
+
+@pytest.mark.renders
+def test_in_motion_there_are_no_more_places_than_bodies_that_something_is_missed_of():
+    moved = Moved({0: (-0.085, 0.008, 0.0)}, BLANK)
+    found = [len(moved.search(search=partial(missing_motion, place=place))) for place in range(4)]
+    assert found == [1, 0, 0, 0]
 
 
 def test_the_one_motion_of_a_part_falls_short_of_the_best_of_each_superpixel():

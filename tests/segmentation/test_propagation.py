@@ -1,7 +1,5 @@
 """Labels carried from view to view, on boxes drawn with exact depth."""
 
-from dataclasses import replace
-
 import cv2
 import numpy as np
 import pytest
@@ -76,27 +74,6 @@ def test_of_what_is_drawn_the_nearest_is_seen_and_what_is_behind_the_camera_is_n
         assert bool(np.mean(covered == 1) > 0.5) is visible
         assert np.isin(covered, (1, 2)).all()
     assert not (drawn([0, 0, -1.0]) == 1).any()
-
-
-def test_where_every_second_row_and_column_is_drawn_four_pixels_have_what_one_has() -> None:
-    frame, label = DrawnScene(SIZES).frame(0, looking_down(), PLACES)
-    height, width = (pixels - pixels % 2 for pixels in label.shape)
-    odd = (slice(height - 1), slice(width - 1))  # an odd number of rows and columns, too
-    smaller = replace(
-        frame,
-        intrinsics=replace(CAMERA, height=height - 1, width=width - 1),
-        color=frame.color[odd],
-        depth=frame.depth[odd],
-        robot=frame.robot[odd],
-    )
-    drawn, depth = draw_labels(smaller, smaller, label[odd], {}, every=2)
-    first = label[:height:2, :width:2].repeat(2, 0).repeat(2, 1)[odd]
-    # Where nothing moves and the camera stands, only gaps of an outline are closed.
-    inner = cv2.erode((first > 0).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
-    np.testing.assert_array_equal(drawn[inner], first[inner])
-    assert np.mean((drawn > 0) == (first > 0)) > 0.999
-    np.testing.assert_allclose(depth[::2, ::2][inner[::2, ::2]], smaller.depth[::2, ::2][inner[::2, ::2]], 1e-6)
-    assert drawn.shape == depth.shape == smaller.depth.shape
 
 
 def test_every_pixel_above_the_table_has_a_label_and_no_other() -> None:

@@ -19,8 +19,8 @@ def seen_once(method: str) -> tuple[Segmentation, tuple]:
     watcher = Watcher(segment=SegmentParameters(method=method))
     seen = watcher.take(frame)
     flows = seen.expected_flow, seen.optical_flow
-    inputs = (seen.pair, *flows, seen.groups, seen.above_0, seen.above_1, SegmentParameters(method=method))
-    return seen.segmentation, (*inputs, BFIFParameters())
+    inputs = (seen.pair, *flows, seen.groups, seen.above_0, seen.above_1, lambda: seen.above_1)
+    return seen.segmentation, (*inputs, SegmentParameters(method=method), BFIFParameters())
 
 
 @pytest.mark.parametrize("method", ["evidence", "paper"])

@@ -175,9 +175,9 @@ def test_a_blank_body_is_followed_from_nearby_by_how_it_looked_before_it_moved(b
 
 def test_the_keyframe_is_seen_again_once_the_camera_has_come_near_and_until_the_next_rest_decides() -> None:
     answers, _ = pushed_from_nearby(True)
-    seen = [None if a.near is None else a.near.frame.sequence for a in answers]
+    seen = [None if len(a.views) < 2 else a.views[1].frame.sequence for a in answers]
     # Frame 4 is the first that looks from where frame 5 does; the body moves from frame 6 on.
     assert seen[:6] == [None] * 5 + [5]
     assert set(seen[6:-2]) == {5}
-    assert answers[-1].near is None
+    assert len(answers[-1].views) == 1
     assert answers[-1].belief.keyframe.frame.sequence > 14

@@ -19,7 +19,7 @@ def seen(known):
     """The scene where the boxes `known` have ids and the others have not moved yet, and the true labels."""
     frame, label = SCENE.frame(0, looking_down(), PLACES)
     mask = np.where(label > 0, np.where(np.isin(label, known), label, UNKNOWN), 0).astype(np.uint16)
-    return replace(nothing_segmented(CAMERA.shape), label=mask, frame=frame, settled=2.0), label
+    return replace(nothing_segmented(CAMERA.shape), label=mask, seen=frame, settled=2.0), label
 
 
 def test_before_anything_moved_all_are_clusters_with_the_largest_first():

@@ -139,12 +139,22 @@ JUST_AFTER = OFFSET + 1e-4
 def test_ports_have_the_names_of_the_contract() -> None:
     inputs, outputs = port_names(FramePairMemory(PERIOD, OFFSET))
     assert inputs == ["frame", "above_table", "flow_span"]
-    assert outputs == ["pair", "above_table_reference", "above_table", "pose_error", "pair_time"]
+    assert outputs == [
+        "pair",
+        "whole_pair",
+        "whole_frame",
+        "above_table_reference",
+        "above_table",
+        "pose_error",
+        "pair_time",
+    ]
 
 
 def test_before_the_first_frame_there_is_nothing() -> None:
     loop = Loop()
     assert loop.at(OFFSET / 2) is NO_PAIR
+    assert loop.read("whole_pair") is NO_PAIR
+    assert loop.read("whole_frame") is NO_FRAME
     assert loop.read("above_table") is NOTHING_ABOVE_TABLE
     assert loop.read("above_table_reference") is NOTHING_ABOVE_TABLE
     assert loop.read("pair_time") == pytest.approx([0.0])

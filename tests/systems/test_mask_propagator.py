@@ -68,6 +68,7 @@ def test_ports_have_the_names_of_the_contract() -> None:
         "groups",
         "above_table_reference",
         "above_table",
+        "whole_above_table",
     ]
     assert outputs == ["mask", "settled_mask", "decided", "untouched", "segmentation"]
 
@@ -94,6 +95,7 @@ def test_the_mask_is_what_the_function_makes_of_the_inputs(payloads) -> None:
             groups,
             payloads.above_0,
             payloads.above_1,
+            lambda: payloads.above_1,
             SegmentParameters(),
             BFIFParameters(),
         )
@@ -150,7 +152,7 @@ def test_the_function_is_handed_the_parameters_given_or_those_by_default(payload
     for name, above in (("above_table_reference", payloads.above_0), ("above_table", payloads.above_1)):
         system.GetInputPort(name).FixValue(simulator.get_mutable_context(), Value[object](above))
     simulator.AdvanceTo(PERIOD / 2)
-    ((before, *inputs, handed_parameters, handed_bfif),) = handed
+    ((before, *inputs, see_whole, handed_parameters, handed_bfif),) = handed
     assert before.mask.shape == CAMERA.shape
     for value, expected in zip(
         inputs,
@@ -165,6 +167,7 @@ def test_the_function_is_handed_the_parameters_given_or_those_by_default(payload
         strict=True,
     ):
         np.testing.assert_equal(value, expected)
+    assert see_whole() is payloads.above_1
     assert handed_parameters == (parameters if given else SegmentParameters())
     assert handed_bfif == (bfif if given else BFIFParameters())
 

@@ -25,7 +25,7 @@ def seen():
     frame = replace(
         NO_FRAME, sequence=0, intrinsics=CAMERA, color=SHOWN.color, depth=SHOWN.depth, X_WC=SHOWN.X_WC
     )
-    return Segmentation(0, np.where(SHOWN.mask > 0, SHOWN.mask, UNKNOWN), frame=frame)
+    return Segmentation(0, np.where(SHOWN.mask > 0, SHOWN.mask, UNKNOWN), seen=frame)
 
 
 def test_the_label_image_of_drake_is_the_mask_and_what_has_not_moved_is_background():

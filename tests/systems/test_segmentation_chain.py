@@ -138,8 +138,9 @@ class Chain:
         ports = [
             stage.get_output_port(k)
             for stage in block.stages
-            if stage is not view  # which follows the arm's tremble, read or not
-            and stage.get_name() != "ObjectsAboveTable"
+            if stage is not view  # which follows the arm's tremble, read or not, as does what it feeds
+            and stage.get_name() != "FrameReducer"
+            and not stage.get_name().endswith("ObjectsAboveTable")  # the whole one is for who asks
             for k in range(stage.num_output_ports())
         ]
         self.reader = builder.AddSystem(Reader(ports))

@@ -12,7 +12,7 @@ from riseg_drake.evaluation.in_motion import overlap_f_of
 from riseg_drake.evaluation.scores import score
 from riseg_drake.recording.reader import RecordingReader
 from riseg_drake.robot.kinematics import PandaKinematics
-from riseg_drake.segmentation.segment_by_evidence import EvidenceParameters
+from riseg_drake.segmentation.look import EvidenceParameters
 
 pytestmark = pytest.mark.renders
 STAGES = ("FrameView", "ObjectsAboveTable", "ExpectedFlow", "OpticalFlow", "BFIFGrouper", "MaskPropagator")
