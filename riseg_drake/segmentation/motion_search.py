@@ -6,7 +6,7 @@ are sharpened, on ever more of what they explain. A patch of a blank thing tells
 with all of what may be one body, whose outline and height tell.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import cv2
@@ -61,8 +61,6 @@ class MotionSearchParameters:
 
 _RING = np.ones((13, 13), np.uint8)
 """Six pixels around an outline are looked at: what was free there is free where it went."""
-ASKED = 3
-"""Bodies, the likeliest to have moved, that are asked in turn what they did while something moves."""
 _EDGES_MIN = 25
 """Pixels with a gradient that it takes to sharpen a motion."""
 _BETTER = 0.3
@@ -107,7 +105,7 @@ def search_motions(problem: SearchProblem, proposed_K: NDArray[np.float64]) -> N
     Those `proposed_K` [G, 4, 4], seen in motion, are taken where they explain what nothing found does.
     """
     keyframe, parameters, likelihood = problem.compared.keyframe, problem.parameters, problem.likelihood
-    search = _Search(problem, np.empty((0, 4, 4)))
+    search = Search(problem, np.empty((0, 4, 4)))
     asked = search.costs.point_count > likelihood.correlated_gray
     tried = np.zeros(keyframe.count, bool)
     for _ in range(parameters.rounds):
@@ -133,53 +131,11 @@ def search_motions(problem: SearchProblem, proposed_K: NDArray[np.float64]) -> N
     return np.array(search.found).reshape(-1, 4, 4)
 
 
-def missing_motion(problem: SearchProblem, known_K: NDArray[np.float64], place: int = 0) -> NDArray[np.float64]:
-    """The one motion [0 or 1, 4, 4] that is missed most beside standing still and known ones [G, 4, 4].
-
-    For a frame in motion, of which there are many: one body is asked about, the likeliest, or that in another
-    `place` after it; with few points, and the best valley alone is gone down. The motion must explain most of
-    what is missed there, `gain_min` nats at least.
-    """
-    keyframe, parameters, likelihood = problem.compared.keyframe, problem.parameters, problem.likelihood
-    gain_min, bodies = problem.gain_min, problem.possible_bodies()
-    if not len(bodies):
-        return np.empty((0, 4, 4))
-    # What moves less far than the grid's step will be seen at the next rest; poses err by as much.
-    least = parameters.step * keyframe.pixels_per_metre
-    quick = replace(parameters, best=1, samples=parameters.samples // 3, same_flow=least)
-    search = _Search(replace(problem, parameters=quick), known_K)
-    missed = _missed(bodies, search.costs, likelihood)
-    while True:
-        # More than a motion's price, for its size: not a sliver, and not a heap of which one thing moves.
-        worst = int(((missed - gain_min) / (bodies @ keyframe.area)).argmax())
-        body = bodies[worst]
-        if 2 * missed[worst] < gain_min:
-            return np.empty((0, 4, 4))
-        if place == 0:
-            break
-        # What it is a part of, or a part of it, is not another.
-        alike = 2 * ((bodies & body) @ keyframe.area) > (bodies | body) @ keyframe.area
-        bodies, missed, place = bodies[~alike], missed[~alike], place - 1
-        if not len(bodies):
-            return np.empty((0, 4, 4))
-    motion = search.best_motion(body, np.where(body, 0.0, np.inf))
-    if motion is not None:
-        explained = search.costs.with_motion(motion[2])
-        if 2 * _missed(body[None], explained, likelihood)[0] < missed[worst]:
-            search.take(motion, body)
-    return np.array(search.found[len(known_K) :]).reshape(-1, 4, 4)
-
-
-def _missed(bodies: NDArray[np.bool_], costs: Costs, parameters: LikelihoodParameters) -> NDArray[np.float64]:
-    """[B], nats by which the best motion of each of bodies [B, N] falls short of one that is right."""
-    missed: NDArray[np.float64] = (bodies @ costs.excess(parameters).T).min(1)
-    return missed
-
-
-class _Search:
+class Search:
     """A keyframe and a frame, prepared for many motions, and those that were found."""
 
     def __init__(self, problem: SearchProblem, known_K: NDArray[np.float64]):
+        """Known are standing still and some motions [G, 4, 4]."""
         compared = self._compared = problem.compared
         self._keyframe, self._frame = compared.keyframe, compared.frame
         self._above, self._divisions, self._gain_min = problem.above, problem.divisions, problem.gain_min
@@ -241,7 +197,7 @@ class _Search:
         for start in self._valleys(patch, samples):
             ends = [self._fitted_to(patch, start)] if blank else self._grown(patch, distance, start)
             for motion in ends:
-                own = self._costs(motion)
+                own = self.costs_of(motion)
                 results.append((self._gain(own), motion, own))
         # Gains end where noise begins; among those that are alike the patch itself tells.
         weight = self.costs.point_count * patch / (2 * self._likelihood.correlated_gray)
@@ -263,7 +219,7 @@ class _Search:
         for better_by in (_BETTER, -np.inf):
             motion = start
             for radius in _GROWTH:
-                mine = self._costs(motion).misfit[0]
+                mine = self.costs_of(motion).misfit[0]
                 explained = (mine < self._parameters.unexplained + 1) & (mine < best_known - better_by)
                 if radius == _GROWTH[0]:
                     explained |= patch
@@ -286,11 +242,11 @@ class _Search:
 
     def sharpened(self, motion: NDArray) -> tuple[float, NDArray, Costs]:
         """A proposed motion [4, 4], made to fit what it explains: the gain, nats, the motion, and its costs."""
-        mine = self._costs(motion).misfit[0]
+        mine = self.costs_of(motion).misfit[0]
         better = (mine < self._parameters.unexplained + 1) & (mine < self.costs.misfit.min(0) - _BETTER)
         fitted = self._fitted(motion, better)
         motion = motion if fitted is None else fitted
-        own = self._costs(motion)
+        own = self.costs_of(motion)
         return self._gain(own), motion, own
 
     def _fitted(self, motion: NDArray, members: NDArray[np.bool_]) -> NDArray | None:
@@ -311,7 +267,8 @@ class _Search:
         ]
         return float(max(better[own.misfit[0] < self._parameters.unexplained + 1].sum(), *of_parts))
 
-    def _costs(self, motion: NDArray) -> Costs:
+    def costs_of(self, motion: NDArray) -> Costs:
+        """How badly a motion [4, 4] explains each superpixel."""
         return motion_costs(self._compared, motion[None], self._likelihood)
 
     def _valleys(self, patch: NDArray[np.bool_], samples: int) -> list[NDArray]:

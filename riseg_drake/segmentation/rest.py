@@ -29,8 +29,8 @@ def is_still(
 ) -> bool:
     """Whether two frames, one after the other, show the same.
 
-    In all their pixels, of which a small motion changes more: of what each pixel of a reduced frame covers one is
-    looked at.
+    In all their pixels, of which a small motion changes more: of those that a pixel of a reduced frame covers
+    one is looked at.
     """
     whole_0, whole_1, n = before.whole, frame.whole, frame.reduction
     span = camera_span(whole_0, whole_1)

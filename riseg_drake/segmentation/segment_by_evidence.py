@@ -27,7 +27,8 @@ from riseg_drake.segmentation.comparison import Comparison, renewed_view_error
 from riseg_drake.segmentation.keyframe import Keyframe, in_fewer_pixels, seen_again
 from riseg_drake.segmentation.look import EvidenceParameters, Look, compared_at_rest, compared_in_motion
 from riseg_drake.segmentation.memory import Memory, draw_memory, moved_memory, remember
-from riseg_drake.segmentation.motion_search import ASKED, SearchProblem, missing_motion, search_motions
+from riseg_drake.segmentation.missing_motion import Missed, missing_motion
+from riseg_drake.segmentation.motion_search import SearchProblem, search_motions
 from riseg_drake.segmentation.motions import BFIFGroups
 from riseg_drake.segmentation.next_keyframe import first_belief, next_belief
 from riseg_drake.segmentation.observation import Observation, motion_price, observe
@@ -90,9 +91,10 @@ def segment_by_evidence(
         and share_in_view(belief, bodies, frame) > parameters.in_view
     )
     if not deciding and now.still_since is None and frame.time - now.searched >= parameters.search_every:
-        missing_N = missing_motion(_problem(belief, compared, look), candidates_N, now.asked)
-        following = 0 if len(missing_N) else (now.asked + 1) % ASKED
-        now = replace(now, searched=frame.time, asked=following)
+        slight_N = replace(now.missed, slight_K=seen_from(X_NK, now.missed.slight_K))
+        missing_N, missed_N = missing_motion(_problem(belief, compared, look), candidates_N, slight_N)
+        missed = replace(missed_N, slight_K=seen_from(inverse(X_NK), missed_N.slight_K))
+        now = replace(now, searched=frame.time, missed=missed)
         candidates_N = np.concatenate([candidates_N, missing_N])
     if len(candidates_N) and not deciding:
         moved = bodies.motion > 0
@@ -239,6 +241,7 @@ def _carried(
         margin=margin,
         belief=following,
         views=_views(following, look),
+        missed=Missed(),
         bodies=since,
         memory=memory,
         decided=decided,

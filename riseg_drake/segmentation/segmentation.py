@@ -12,6 +12,7 @@ from riseg_drake.segmentation.bodies import Bodies
 from riseg_drake.segmentation.comparison import ViewError
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.memory import Memory
+from riseg_drake.segmentation.missing_motion import Missed
 from riseg_drake.segmentation.propagation import UNKNOWN
 
 
@@ -42,8 +43,8 @@ class Segmentation(Immutable):
     """Whether the present rest has been looked at."""
     searched: float = float("-inf")
     """s; when a motion that nothing proposed was looked for."""
-    asked: int = 0
-    """Whose motion is looked for next: its place among the bodies that are likeliest to have moved."""
+    missed: Missed = field(default_factory=Missed)
+    """What came of that since the keyframe."""
     view_error: ViewError = field(default_factory=ViewError)
     """What the pairs so far have shown of it."""
     memory: Memory = field(default_factory=dict)
