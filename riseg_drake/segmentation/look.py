@@ -1,10 +1,15 @@
 """What line 7 has before it at t: the frame, in few pixels and in all, and what that is compared with."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+import numpy as np
+from numpy.typing import NDArray
+
+from riseg_drake.geometry.plane import transform_plane
 from riseg_drake.geometry.rgbd import Frame, FramePair
+from riseg_drake.geometry.se3 import inverse
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.belief import BeliefParameters
 from riseg_drake.segmentation.bfif import BFIFParameters
@@ -65,6 +70,29 @@ class Look:
     def whole_above(self) -> AboveTable:
         """ObjMask at t of the whole frame."""
         return self.see_whole()
+
+
+def agreeing(look: Look, poses: Mapping[int, NDArray[np.float64]]) -> Look:
+    """The same with poses that agree with the reference's own `poses` [4, 4], by frame number, as far as known.
+
+    Poses that err are set right within a pair (`camera_motion`), whose reference has the pose that it came with,
+    and errs with that against the keyframe. The pose that was set right when it was new does not.
+    """
+    reference, current = look.pair.reference, look.pair.current
+    X_WC0 = poses.get(reference.sequence)
+    if X_WC0 is None or np.array_equal(X_WC0, reference.X_WC):
+        return look
+    X_AW = X_WC0 @ inverse(reference.X_WC)  # from the world as it came to the one that agrees
+
+    def moved(above: AboveTable) -> AboveTable:
+        return replace(above, plane_W=transform_plane(X_AW, above.plane_W))
+
+    pair = replace(
+        look.pair,
+        reference=replace(reference, X_WC=X_WC0),
+        current=replace(current, X_WC=X_AW @ current.X_WC),
+    )
+    return replace(look, pair=pair, above=moved(look.above), see_whole=lambda: moved(look.see_whole()))
 
 
 def compared_in_motion(now: Segmentation, look: Look) -> Comparison:

@@ -25,7 +25,13 @@ from riseg_drake.segmentation.bodies import Bodies, bodies_of, carry_bodies, reb
 from riseg_drake.segmentation.candidates import candidate_motions
 from riseg_drake.segmentation.comparison import Comparison, renewed_view_error
 from riseg_drake.segmentation.keyframe import Keyframe, in_fewer_pixels, seen_again
-from riseg_drake.segmentation.look import EvidenceParameters, Look, compared_at_rest, compared_in_motion
+from riseg_drake.segmentation.look import (
+    EvidenceParameters,
+    Look,
+    agreeing,
+    compared_at_rest,
+    compared_in_motion,
+)
 from riseg_drake.segmentation.memory import Memory, draw_memory, moved_memory, remember
 from riseg_drake.segmentation.missing_motion import Missed, missing_motion
 from riseg_drake.segmentation.motion_search import SearchProblem, search_motions
@@ -64,7 +70,8 @@ def segment_by_evidence(
         parameters: see there.
         bfif: what the groups were made with: noise of the measurements, and when two motions are one.
     """
-    look, frame = Look(pair, above_1, see_whole, parameters, bfif), pair.current
+    look = agreeing(Look(pair, above_1, see_whole, parameters, bfif), before.poses)
+    pair, frame, above_1 = look.pair, look.frame, look.above
     if before.belief is None:
         return _begin(before, look)
     now = _with_rest(before, look)
@@ -132,6 +139,7 @@ def _begin(before: Segmentation, look: Look) -> Segmentation:
         label=label,
         belief=belief,
         views=views,
+        poses={frame.sequence: frame.X_WC},
         seen=look.frame,
         settled=parameters.settled,
     )
@@ -212,12 +220,14 @@ def _carried(
     remembered = draw_memory(moved_on, frame)
     label = carry_bodies(drawn, bodies, frame, above, remembered)
     kept = {s: b for s, b in now.bodies.items() if s >= pair.reference.sequence}
+    poses = {s: X for s, X in now.poses.items() if s >= pair.reference.sequence}
     now = replace(
         now,
         sequence=frame.sequence,
         label=np.where(frame.whole.robot, np.uint16(0), enlarged(label, frame)),
         seen=look.frame,
         bodies={**kept, frame.sequence: bodies},
+        poses={**poses, frame.sequence: frame.X_WC},
     )
     margin = now.margin
     if deciding and seen is not None:

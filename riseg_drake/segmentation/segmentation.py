@@ -35,6 +35,8 @@ class Segmentation(Immutable):
     before anything moved, from there."""
     bodies: Mapping[int, Bodies] = field(default_factory=dict)
     """By frame number, since the pair's reference: the bodies, and how they moved since the keyframe."""
+    poses: Mapping[int, NDArray[np.float64]] = field(default_factory=dict)
+    """By frame number, since the pair's reference: X_WC [4, 4] as they agree with each other."""
     seen: Frame | None = None
     """The last frame, in as few pixels as is worked with in motion."""
     still_since: float | None = None

@@ -22,6 +22,7 @@ from riseg_drake.systems.bfif_grouper import BFIFGrouper
 from riseg_drake.systems.camera_motion import CameraMotion
 from riseg_drake.systems.expected_flow import ExpectedFlow
 from riseg_drake.systems.frame_pair import FramePairMemory
+from riseg_drake.systems.frame_reducer import FrameReducer
 from riseg_drake.systems.frame_view import FrameView
 from riseg_drake.systems.mask_propagator import MaskPropagator
 from riseg_drake.systems.mask_refiner import MaskRefiner
@@ -37,6 +38,7 @@ SMALL = Intrinsics(32, 24, 30.0, 30.0, 15.5, 11.5)
 
 MAKE = {
     FrameView: lambda: FrameView(SMALL, lambda q: q, lambda q: q),
+    FrameReducer: lambda: FrameReducer(320),
     ObjectsAboveTable: ObjectsAboveTable,
     FramePairMemory: lambda: FramePairMemory(0.1, 0.001),
     CameraMotion: CameraMotion,

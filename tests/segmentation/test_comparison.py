@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from riseg_drake.geometry.reduction import reduced
 from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.segmentation.comparison import Comparison, ViewError, renewed_view_error
 from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe
@@ -34,6 +35,14 @@ def test_what_stands_seems_to_move_by_a_share_of_the_cameras_motion(keyframe: Ke
     assert compared.another_view == pytest.approx(CAMERA.fx * aside / DEPTH / 100, rel=1e-3, abs=1e-9)
     # And depth by as large a share, times how far it is another view, which it is from 100 pixels on.
     assert compared.depth_error == pytest.approx(compared.shift / 100)
+
+
+def test_in_half_as_many_pixels_a_row_a_view_is_as_much_another_one_and_errs_by_half_as_many(keyframe) -> None:
+    whole, few = over(0.05), reduced(over(0.05), 160)
+    compared, in_few = (Comparison(keyframe, frame, 0.0023, view_error=0.02) for frame in (whole, few))
+    assert in_few.another_view == pytest.approx(compared.another_view, rel=1e-3)
+    assert in_few.depth_error == pytest.approx(compared.depth_error, rel=1e-3)
+    assert in_few.shift == pytest.approx(compared.shift / 2, rel=1e-3)
 
 
 def test_from_100_pixels_on_it_is_another_view_and_no_more_than_that(keyframe: Keyframe) -> None:

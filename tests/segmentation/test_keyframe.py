@@ -7,9 +7,16 @@ import numpy as np
 import pytest
 
 from riseg_drake.geometry.camera import rays
+from riseg_drake.geometry.reduction import reduced
 from riseg_drake.geometry.se3 import move_points
 from riseg_drake.segmentation.above_table import AboveTable, AboveTableParameters, objects_above_table
-from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe, seen_again
+from riseg_drake.segmentation.keyframe import (
+    Keyframe,
+    KeyframeParameters,
+    in_fewer_pixels,
+    make_keyframe,
+    seen_again,
+)
 from riseg_drake.segmentation.noise import MeasurementNoise, gray_variance
 from tests.segmentation.drawn_scene import DrawnScene, looking_down, planar
 
@@ -225,3 +232,28 @@ def test_seen_again_what_the_robot_hides_or_stands_elsewhere_is_of_no_superpixel
     near = again(keyframe, frame)
     shown = near.image_of(np.ones(near.count, np.uint8)) > 0
     assert np.count_nonzero(shown & (label == 0)) < 0.05 * np.count_nonzero(shown)
+
+
+def test_in_fewer_pixels_it_is_cut_as_it_was_in_a_quarter_of_the_pixels(keyframe, boxes):
+    frame, _, _ = boxes
+    few = reduced(frame, 160)
+    small = in_fewer_pixels(
+        keyframe, few, objects_above_table(few, AboveTableParameters()), NOISE, KeyframeParameters()
+    )
+    assert small.frame is few
+    np.testing.assert_array_equal(small.borders, keyframe.borders)
+    # Of each two by two pixels that one counts whose depth the reduced frame has.
+    number = np.arange(1, keyframe.count + 1)
+    np.testing.assert_array_equal(small.image_of(number), keyframe.image_of(number)[1::2, 1::2])
+    np.testing.assert_array_equal(
+        small.area, np.bincount(small.image_of(number).ravel(), minlength=keyframe.count + 1)[1:]
+    )
+    v, u = small.points.pixel
+    np.testing.assert_array_equal(small.owner, small.image_of(number)[v, u] - 1)
+    np.testing.assert_array_equal(small.gray, few.gray[v, u])
+    assert small.pixels_per_metre == pytest.approx(keyframe.pixels_per_metre / 2, rel=0.01)
+
+
+def test_in_the_pixels_of_a_whole_frame_it_is_itself(keyframe, boxes):
+    frame, above, _ = boxes
+    assert in_fewer_pixels(keyframe, frame, above, NOISE, KeyframeParameters()) is keyframe
