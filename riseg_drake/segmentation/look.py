@@ -75,7 +75,7 @@ class Look:
 def agreeing(look: Look, poses: Mapping[int, NDArray[np.float64]]) -> Look:
     """The same with poses that agree with the reference's own `poses` [4, 4], by frame number, as far as known.
 
-    Poses that err are set right within a pair (`camera_motion`), whose reference has the pose that it came with,
+    Poses that err are set right within a pair (`camera_motion`), whose reference has the pose it came with,
     and errs with that against the keyframe. The pose that was set right when it was new does not.
     """
     reference, current = look.pair.reference, look.pair.current
