@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
-from riseg_drake.geometry.camera import project, rays, rays_at
+from riseg_drake.geometry.camera import pixel_grid, project, rays, rays_at
 from riseg_drake.geometry.plane import transform_plane
 from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
 from riseg_drake.geometry.se3 import exp_se3, inverse, move_points, skew
@@ -28,10 +28,10 @@ from riseg_drake.segmentation.noise import MeasurementNoise, flow_sigma
 
 _PLANE_TILT_SIGMA, _PLANE_HEIGHT_SIGMA = 5e-4, 3e-4
 """Standard deviations of a fitted table's tilt, rad, and height, m."""
-_BOUNDARY = np.ones((21, 21), np.uint8)
+_BOUNDARY = np.ones((15, 15), np.uint8)
 """So far from an outline, in pixels, flow of one side leaks to the other."""
 _CORRELATED = 9.0
-"""Points of flow sampled a dozen pixels apart that are worth one."""
+"""Points of flow that are worth one."""
 _STILL_TABLE, _STILL_ALL = 0.75, 0.5
 """Shares of the points of the table, and of all points, that surely stand still. What is left between expected
 and observed flow has long tails, since depth errs; its standard deviation is read off as far out as what moves
@@ -44,7 +44,7 @@ class CameraMotionParameters:
     """When poses are set right, and how far."""
 
     exact: float = 0.5
-    """Pixels; poses whose error moves the image by less are taken as they are."""
+    """Pixels of the whole frame; poses whose error moves the image by less are taken as they are."""
     frames: float = 30.0
     """Over about so many frames that the camera moved is the poses' error estimated."""
     confidence: float = 0.95
@@ -55,8 +55,8 @@ class CameraMotionParameters:
     """rad; where the table tilts by more between two frames, it is another plane."""
     height_max: float = 0.03
     """m; where it rises or sinks by more, too."""
-    points: int = 4000
-    """Pixels that are asked."""
+    points: int = 2000
+    """Of the pixels that have texture, and no outline near by, so many are asked at most."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ def settled_pair(
     """
     intrinsics = pair.current.intrinsics
     sigma_R, sigma_p = error.sigma(parameters.confidence)
-    if intrinsics.fx * np.hypot(sigma_R, sigma_p / above_0.distance) < parameters.exact:
+    if pair.current.whole.intrinsics.fx * np.hypot(sigma_R, sigma_p / above_0.distance) < parameters.exact:
         return pair
     p_C0Q, residual_sigma, on_table, uv_1 = _points(pair, optical_flow, above_0, noise, parameters.points)
     if len(p_C0Q) < 30:
@@ -174,21 +174,20 @@ def _points(
     optical_flow: NDArray[np.float32],
     above_0: AboveTable,
     noise: MeasurementNoise,
-    count: int,
+    most: int,
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Textured points p_C0Q [N, 3], the noise of their flow [N], whether they are table, and (u, v) at t."""
     reference, intrinsics = pair.reference, pair.current.intrinsics
-    step = max(1, int(np.sqrt(intrinsics.width * intrinsics.height / count)))
-    every = (slice(step // 2, None, step), slice(step // 2, None, step))
-    sigma = flow_sigma(reference.gray, noise)[every]
-    depth = reference.depth[every]
-    v, u = np.mgrid[: intrinsics.height, : intrinsics.width][(slice(None), *every)]
-    uv_1 = np.stack([u, v], axis=-1) + optical_flow[every].astype(float)
+    sigma = flow_sigma(reference.gray, noise)
+    uv_1 = pixel_grid(*intrinsics.shape) + optical_flow
     inside = (uv_1 >= 0).all(-1) & (uv_1[..., 0] < intrinsics.width) & (uv_1[..., 1] < intrinsics.height)
-    boundary = cv2.morphologyEx(above_0.mask.astype(np.uint8), cv2.MORPH_GRADIENT, _BOUNDARY)[every] > 0
-    good = ~boundary & inside & (depth > 0) & ~reference.robot[every] & (sigma < 2 * noise.flow)
-    p_C0Q = (rays(intrinsics)[every] * depth[..., None])[good].astype(float)
-    return p_C0Q, sigma[good].astype(float), ~above_0.mask[every][good], uv_1[good]
+    boundary = cv2.morphologyEx(above_0.mask.astype(np.uint8), cv2.MORPH_GRADIENT, _BOUNDARY) > 0
+    good = ~boundary & inside & (reference.depth > 0) & ~reference.robot & (sigma < 2 * noise.flow)
+    v, u = np.nonzero(good)
+    every = slice(None, None, max(1, -(-len(v) // most)))
+    asked = v[every], u[every]
+    p_C0Q = (rays(intrinsics)[asked] * reference.depth[asked][:, None]).astype(float)
+    return p_C0Q, sigma[asked].astype(float), ~above_0.mask[asked], uv_1[asked].astype(float)
 
 
 def _fit(

@@ -17,6 +17,7 @@ from riseg_drake.stations.misbehaviour import CONTROL_CHANNEL, UnreliableLink, W
 from riseg_drake.stations.panda_driver import DriverEnd, PandaDriverConfig
 
 _LONGEST_CATCHING_UP = 50_000  # us; if this process was kept from running for longer, time is skipped
+_QUIET = 10_000_000  # us, until it is said again that time was skipped
 
 
 @dataclass
@@ -93,6 +94,9 @@ class PandaSide:
         self._restarts_at: int | None = None
         self._was_connected = True
         self._told: DriverEnd | None = None
+        self._skipped_us = 0
+        """Since that was told, and when and at which number of status messages it was."""
+        self._told_at = arm.wall_us, 0
         lcm.Subscribe(config.lcm.command_channel, self._hear)
 
     def _hear(self, raw: bytes) -> None:  # LCM calls this from C: nothing may be raised
@@ -113,6 +117,7 @@ class PandaSide:
         behind = wall_us - self.arm.wall_us
         if abs(behind) > _LONGEST_CATCHING_UP:  # or the clock was set
             self.arm.skip(behind - TICK_US)
+            self._skipped_us += max(0, behind)
         if not self._link.is_stalled(now):
             self._lcm.HandleSubscriptions(0)
         for word in self._ears.words("arm", "status"):
@@ -126,6 +131,7 @@ class PandaSide:
             self.arm.tick()
             ticks += 1
         self._tell()
+        self._tell_skipped(wall_us)
         if ticks and self.arm.driver.is_connected:
             self._link.send(self.arm.status().encode(), now)
         for message in self._link.due(now):
@@ -178,6 +184,21 @@ class PandaSide:
         if driver.is_connected and not self._was_connected:
             self._ears.note(f"the driver is back, robot_mode is {driver.robot.mode}")
         self._was_connected = driver.is_connected
+
+    def _tell_skipped(self, wall_us: int) -> None:
+        """Note that this computer is too slow, and which rate is reached."""
+        since, published = self._told_at
+        elapsed = wall_us - since
+        if elapsed < _QUIET:
+            return
+        if self._skipped_us:
+            rate = 1e6 * (self.published - published) / elapsed
+            self._ears.note(
+                f"this computer is too slow: {1e-6 * self._skipped_us:.1f} of the last {1e-6 * elapsed:.0f} s "
+                f"were skipped, and the arm's status came at {rate:.0f} Hz; fewer pictures (`emulator.rate`) "
+                "leave more for the arm"
+            )
+        self._skipped_us, self._told_at = 0, (wall_us, self.published)
 
 
 @dataclass(frozen=True)

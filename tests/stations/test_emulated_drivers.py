@@ -138,6 +138,24 @@ def test_a_process_that_was_kept_from_running_catches_up_in_one_message(robot):
     assert status.robot_utime - before < 100_000  # what was missed for long is left out
 
 
+def test_a_computer_that_is_too_slow_is_told_every_ten_seconds_with_what_it_reaches():
+    robot = Robot()
+    robot.wait(60 * 166, every=60)  # 9.96 s; longer than is made up for, each time
+    assert robot.side.notes() == []
+    robot.wait(60, every=60)
+    (told,) = robot.side.notes()
+    assert "too slow: 10.0 of the last 10 s were skipped" in told
+    assert "status came at 17 Hz" in told
+    robot.wait(60 * 167, every=60)
+    assert len(robot.side.notes()) == 1
+
+
+def test_a_computer_that_keeps_up_is_told_nothing():
+    robot = Robot()
+    robot.wait(40 * 260, every=40)
+    assert robot.side.notes() == []
+
+
 @pytest.mark.parametrize("by", [1.0, -1.0, 0.3, -0.06])
 def test_a_clock_that_is_set_silences_nobody(by):
     robot = Robot()
