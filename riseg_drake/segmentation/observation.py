@@ -54,8 +54,6 @@ class ObservationParameters:
     """Least share of standing still: most does."""
     still: float = 0.5
     """Nats by which a superpixel that says nothing stands still rather than moves."""
-    goes_on: float = 0.5
-    """Nats by which one that had moved in the frame before still has: what is hidden has not gone back."""
     border: float = 1.0
     """Share of a border's log-odds by which unequal motions on both sides are less likely."""
     border_least: float = 0.2
@@ -87,7 +85,6 @@ def observe(
     shown: NDArray[np.float64],
     candidates_K: NDArray[np.float64],
     parameters: ObservationParameters,
-    before: NDArray[np.bool_] | None = None,
 ) -> Observation:
     """Explain a frame by standing still and some of the candidate motions.
 
@@ -98,7 +95,6 @@ def observe(
         shown: [M], of how many freedoms of a motion both sides of a border tell, see `coincidence`.
         candidates_K: [C, 4, 4], motions since the keyframe, seen from its camera.
         parameters: see there.
-        before: [N], which superpixels had moved in the frame before; None where that is not to count.
     """
     keyframe = compared.keyframe
     candidates_K = candidates_K.reshape(-1, 4, 4)
@@ -109,8 +105,6 @@ def observe(
     motions_K = np.concatenate([np.eye(4)[None], candidates_K])
     nats = motion_costs(compared, motions_K, parameters.likelihood).nats(parameters.likelihood)
     moves = _more_than_the_view_errs(compared, motions_K, nats, parameters.likelihood.view_errors)
-    if before is not None:
-        nats[0] += parameters.goes_on * before
     motions_K, nats = motions_K[moves], nats[moves]
     price = motion_price(compared, parameters)
     needed, motion = _fewest_motions(nats, keyframe, bond, part, price, parameters)

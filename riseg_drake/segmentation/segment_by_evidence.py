@@ -104,8 +104,7 @@ def segment_by_evidence(
         now = replace(now, searched=frame.time, missed=missed)
         candidates_N = np.concatenate([candidates_N, missing_N])
     if len(candidates_N) and not deciding:
-        moved = bodies.motion > 0
-        seen, bodies = _explained(belief, compared, candidates_N, bodies, parameters, moved)
+        seen, bodies = _explained(belief, compared, candidates_N, bodies, parameters)
         deciding = has_gone_far(now, look, seen, bodies)
     # What the next keyframe cannot be compared with any more is looked for now.
     leaves = bool(above_1.mask.any()) and leaves_keyframe(now, bodies, look)
@@ -170,13 +169,10 @@ def _explained(
     candidates_N: NDArray[np.float64],
     before: Bodies,
     parameters: EvidenceParameters,
-    moved: NDArray[np.bool_] | None = None,
 ) -> tuple[Observation, Bodies]:
     """What a frame says, given some motions [C, 4, 4] as the camera that it is compared with sees them, and the
-    bodies by it; `moved` [N], what had done so in the frame before."""
-    seen = observe(
-        compared, belief.bond, belief.part, belief.shown, candidates_N, parameters.observation, moved
-    )
+    bodies by it."""
+    seen = observe(compared, belief.bond, belief.part, belief.shown, candidates_N, parameters.observation)
     X_KN = inverse(belief.keyframe.frame.X_WC) @ compared.keyframe.frame.X_WC
     seen = replace(seen, motions_K=seen_from(X_KN, seen.motions_K))
     return bodies_of(belief, seen, before, parameters.belief, parameters.observation)

@@ -188,29 +188,6 @@ def test_a_motion_that_alone_explains_all_of_a_part_is_kept_though_two_others_ex
     np.testing.assert_array_equal(motion, 1 - half)
 
 
-@pytest.mark.renders
-def test_what_had_moved_in_the_frame_before_costs_half_a_nat_more_where_it_is_to_stand_still() -> None:
-    scene, places = (
-        DrawnScene([(0.08, 0.07, 0.03), (0.06, 0.08, 0.05)]),
-        [planar(-0.07, 0.0), planar(0.06, 0.0)],
-    )
-    there = [planar(-0.06, 0.0), places[1]]
-    pair, label, _ = scene.pair((looking_down(), looking_down()), (places, there), np.random.default_rng(0))
-    belief = first_belief(
-        pair.reference, standing(pair.reference, label > 0), MeasurementNoise(), BeliefParameters()
-    )
-    compared = Comparison(belief.keyframe, pair.current, depth_noise=0.0023, view_error=0.01)
-    arguments = (compared, belief.bond, belief.part, belief.shown)
-    motion = motion_seen_from(looking_down(), places[0], there[0])
-    some = np.arange(belief.keyframe.count) % 3 == 0
-    parameters = ObservationParameters()
-    assert parameters.goes_on == 0.5
-    plain, after = (observe(*arguments, motion, parameters, before) for before in (None, some))
-    assert len(plain.nats) == len(after.nats) == 2
-    np.testing.assert_allclose(after.nats[0] - plain.nats[0], np.where(some, 0.5, 0.0), atol=1e-6)
-    np.testing.assert_array_equal(after.nats[1], plain.nats[1])
-
-
 @pytest.mark.parametrize(("shift", "price"), [(0.0, 20.0), (0.25, 30.0), (1.0, 60.0)])
 def test_a_motion_costs_more_the_more_the_view_has_changed(shift, price):
     parameters = ObservationParameters(motion_cost=20.0, view_cost=2.0)

@@ -44,7 +44,6 @@ WITHOUT: dict[str, Switch] = {
     "no memory of what left the view": {"segment.evidence.memory": False},
     "no keyframe seen again from nearby": {"segment.evidence.creep": 0.0},
     "in motion whole frames, not reduced": {"frame_pair.width": 0},
-    "in motion what has moved may have gone back": {"segment.evidence.observation.goes_on": 0.0},
     "alike motions count at every push": {"segment.evidence.belief.once": False},
     "alike motions count, however little is shown": {"segment.evidence.observation.touching": -2.0},
 }
