@@ -23,16 +23,26 @@ def reduced(frame: Frame, width: int) -> Frame:
     n = frame.intrinsics.width // width if width > 0 else 1
     if n < 2:
         return frame
-    intrinsics = reduced_intrinsics(frame.intrinsics, n)
-    size, (rows, columns) = (intrinsics.width, intrinsics.height), (n * k for k in intrinsics.shape)
     return replace(
         frame,
-        intrinsics=intrinsics,
-        color=cv2.resize(frame.color[:rows, :columns], size, interpolation=cv2.INTER_AREA),
-        depth=np.ascontiguousarray(frame.depth[n // 2 : rows : n, n // 2 : columns : n]),
-        robot=_any(frame.robot[:rows, :columns], size),
+        intrinsics=reduced_intrinsics(frame.intrinsics, n),
+        color=mean_of_each(frame.color, n),
+        depth=np.ascontiguousarray(one_of_each(frame.depth, n)),
+        robot=mean_of_each(frame.robot.view(np.uint8) * np.uint8(255), n) > 0,
         source=frame,
     )
+
+
+def mean_of_each(image: NDArray[np.uint8], n: int) -> NDArray[np.uint8]:
+    """Mean of each n x n pixels of an image [H, W, ...], as [H // n, W // n, ...]."""
+    height, width = (k // n for k in image.shape[:2])
+    return cv2.resize(image[: n * height, : n * width], (width, height), interpolation=cv2.INTER_AREA)
+
+
+def one_of_each(image: NDArray, n: int) -> NDArray:
+    """The middle one of each n x n pixels of an image [H, W, ...], as [H // n, W // n, ...]; a view of it."""
+    height, width = (k // n for k in image.shape[:2])
+    return image[n // 2 : n * height : n, n // 2 : n * width : n]
 
 
 def reduced_intrinsics(intrinsics: Intrinsics, n: int) -> Intrinsics:
@@ -77,8 +87,3 @@ def enlarged(label: NDArray[np.uint16], frame: Frame) -> NDArray[np.uint16]:
             np.copyto(gap, apart, where=nearer)
         out.ravel()[place] = found
     return out
-
-
-def _any(mask: NDArray[np.bool_], size: tuple[int, int]) -> NDArray[np.bool_]:
-    """Where some pixel of a mask [H, W] is set, of what each pixel of an image of `size` (w, h) covers."""
-    return cv2.resize(mask.view(np.uint8) * np.uint8(255), size, interpolation=cv2.INTER_AREA) > 0

@@ -48,11 +48,15 @@ class Frame(Immutable):
     source: "Frame | None" = None
     """What this was reduced from, as it came from the camera; None if it is that."""
 
-    @cached_property
+    @property
     def whole(self) -> "Frame":
         """The frame in all pixels that the camera gave; itself if it was not reduced."""
-        if self.source is None:
-            return self
+        return self if self.source is None else self._whole
+
+    @cached_property
+    def _whole(self) -> "Frame":
+        # Kept only where it is another frame: one that keeps itself would not be freed when it is dropped.
+        assert self.source is not None
         return replace(self.source, sequence=self.sequence, time=self.time, X_WC=self.X_WC, gain=self.gain)
 
     @property
@@ -111,9 +115,11 @@ class FramePair(Immutable):
     """Effective flow that the reference and the frame before `current` turned out to span, pixels: so far
     had things moved."""
 
-    @cached_property
+    @property
     def whole(self) -> "FramePair":
         """The same in all pixels that the camera gave; `residual` and `span` are still those of this pair."""
+        if self.current.source is None:
+            return self
         return replace(self, reference=self.reference.whole, current=self.current.whole)
 
     @property

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.geometry.reduction import mean_of_each, one_of_each, reduced_intrinsics
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.segmentation.above_table import AboveTable, AboveTableParameters, objects_above_table
 from riseg_drake.segmentation.table_plane import NoPlaneError
@@ -64,22 +64,10 @@ def agreed_flow(first: Frame, second: Frame) -> tuple[NDArray[np.float32], NDArr
 
 
 def _smaller(frame: Frame, step: int) -> Frame:
-    k = frame.intrinsics
-    width, height = k.width // step, k.height // step
-    intrinsics = Intrinsics(
-        width,
-        height,
-        k.fx / step,
-        k.fy / step,
-        (k.cx + 0.5) / step - 0.5,
-        (k.cy + 0.5) / step - 0.5,
-    )
-    part = (slice(height * step), slice(width * step))
-    middle = (slice(step // 2, height * step, step), slice(step // 2, width * step, step))
     return replace(
         frame,
-        intrinsics=intrinsics,
-        color=cv2.resize(frame.color[part], (width, height), interpolation=cv2.INTER_AREA),
-        depth=np.ascontiguousarray(frame.depth[middle]),
-        robot=np.ascontiguousarray(frame.robot[middle]),
+        intrinsics=reduced_intrinsics(frame.intrinsics, step),
+        color=mean_of_each(frame.color, step),
+        depth=np.ascontiguousarray(one_of_each(frame.depth, step)),
+        robot=np.ascontiguousarray(one_of_each(frame.robot, step)),
     )

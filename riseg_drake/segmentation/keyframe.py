@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import WHOLE, Region, bounding_region
 from riseg_drake.geometry.nearest import nearest_values
+from riseg_drake.geometry.reduction import one_of_each
 from riseg_drake.geometry.rgbd import Frame, Immutable
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.alignment import EdgePixels, edge_pixels, has_contrast
@@ -170,10 +171,8 @@ def in_fewer_pixels(
     """The keyframe, cut as it is, in the pixels of its own frame after `reduced`; itself if that is whole."""
     if frame.source is None:
         return keyframe
-    n = frame.reduction
-    owner = keyframe.image_of(np.arange(keyframe.count), -1)[n // 2 :: n, n // 2 :: n]
-    height, width = frame.depth.shape
-    return _shown(keyframe, frame, owner[:height, :width], above, noise, parameters)
+    owner = one_of_each(keyframe.image_of(np.arange(keyframe.count), -1), frame.reduction)
+    return _shown(keyframe, frame, owner, above, noise, parameters)
 
 
 def seen_again(

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from riseg_drake.geometry.reduction import one_of_each
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.frame_pairs import camera_span
@@ -32,16 +33,16 @@ def is_still(
     In all their pixels, of which a small motion changes more: of those that a pixel of a reduced frame covers
     one is looked at.
     """
-    whole_0, whole_1, n = before.whole, frame.whole, frame.reduction
+    whole_0, whole_1 = before.whole, frame.whole
     span = camera_span(whole_0, whole_1)
     if span > parameters.camera_span:
         return False
-    v, u = np.nonzero(above.mask & ~frame.robot & ~before.robot)
-    if not len(v):
+    looked_at = above.mask & ~frame.robot & ~before.robot
+    if not looked_at.any():
         return True
-    looked_at = n * v + n // 2, n * u + n // 2
     gray_0, gray_1, gradient_squared = (
-        image[looked_at] for image in (whole_0.gray, whole_1.gray, whole_0.gradient_squared)
+        one_of_each(image, frame.reduction)[looked_at]
+        for image in (whole_0.gray, whole_1.gray, whole_0.gradient_squared)
     )
     # What the camera's own last creeping does to the image is no motion of things.
     variance = gray_variance(gradient_squared, replace(noise, registration=noise.registration + span))

@@ -208,12 +208,11 @@ def _carried(
         int(a): bodies.motions_K[bodies.motion[bodies.body == a][0]]
         for a in np.unique(bodies.body[(bodies.body > 0) & (bodies.motion > 0)])
     }
-    moved_on = moved_memory(now.memory, moves, X_WK)
     if deciding or now.still_since is not None:
         frame, above, drawn = look.frame.whole, look.whole_above, belief
     else:
         frame, above, drawn = look.frame, look.above, replace(belief, keyframe=now.views[0])
-    remembered = draw_memory(moved_on, frame)
+    remembered = draw_memory(moved_memory(now.memory, moves, X_WK), frame)
     label = carry_bodies(drawn, bodies, frame, above, remembered)
     kept = {s: b for s, b in now.bodies.items() if s >= pair.reference.sequence}
     poses = {s: X for s, X in now.poses.items() if s >= pair.reference.sequence}

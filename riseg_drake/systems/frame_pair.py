@@ -54,7 +54,7 @@ class FramePairMemory(LeafSystem):
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, offset, self._take_frame)
         for name, read in (
             ("pair", lambda memory: memory.pair),
-            ("whole_pair", lambda memory: NO_PAIR if memory.pair is NO_PAIR else memory.pair.whole),
+            ("whole_pair", lambda memory: memory.pair.whole),
             ("whole_frame", lambda memory: memory.pair.current.whole),
             ("above_table_reference", lambda memory: memory.above_0),
             ("above_table", lambda memory: memory.above_1),

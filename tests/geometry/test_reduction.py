@@ -1,5 +1,8 @@
 """A reduced frame sees what the whole one does, of the same points in space, in fewer pixels."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 
@@ -49,6 +52,19 @@ def test_a_frame_that_is_too_small_or_to_stay_whole_is_the_answer_itself(width: 
     assert reduced(whole, width) is whole
     assert whole.whole is whole
     assert whole.reduction == 1
+
+
+@pytest.mark.parametrize("width", [0, 32])
+def test_frames_that_are_dropped_are_freed_at_once_without_a_search_for_cycles(width: int) -> None:
+    seen = reduced(frame(), width)
+    left = [weakref.ref(each) for each in (seen, seen.whole, seen.whole.whole)]
+    assert seen.reduction == (2 if width else 1)
+    gc.disable()
+    try:
+        del seen
+        assert [each() for each in left] == [None] * 3
+    finally:
+        gc.enable()
 
 
 @pytest.mark.parametrize("n", [2, 3, 4])
