@@ -25,6 +25,7 @@ from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
 from riseg_drake.geometry.se3 import exp_se3, inverse, move_points, skew
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.noise import MeasurementNoise, flow_sigma
+from riseg_drake.segmentation.scales import OUTLIER
 
 _PLANE_TILT_SIGMA, _PLANE_HEIGHT_SIGMA = 5e-4, 3e-4
 """Standard deviations of a fitted table's tilt, rad, and height, m."""
@@ -111,10 +112,14 @@ def renewed_pose_error(
     tilt, height, _, _ = table_change(before, above_0.plane_W, after, above_1.plane_W)
     if np.linalg.norm(tilt) > parameters.tilt_max or abs(height) > parameters.height_max:
         return known
+    # Poses that err do so in every frame; a table of which little was seen may tilt once.
+    most_R, most_p = OUTLIER * np.square(known.sigma(parameters.confidence))
+    if known.frames == 0:
+        most_R = most_p = np.inf
     kept = max(0.0, 1 - 1 / parameters.frames)
     return PoseError(
-        tilt_squares=kept * known.tilt_squares + float(tilt @ tilt),
-        height_squares=kept * known.height_squares + height**2,
+        tilt_squares=kept * known.tilt_squares + min(float(tilt @ tilt), 2 * most_R),
+        height_squares=kept * known.height_squares + min(height**2, most_p),
         frames=kept * known.frames + 1,
     )
 

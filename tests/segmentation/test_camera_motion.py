@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
 
 from riseg_drake.geometry.rgbd import FramePair
 from riseg_drake.geometry.se3 import inverse, log_se3
@@ -14,6 +15,7 @@ from riseg_drake.segmentation.camera_motion import (
     PoseError,
     renewed_pose_error,
     settled_pair,
+    table_change,
 )
 from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.optical_flow import DisFlow
@@ -132,3 +134,35 @@ def test_a_camera_that_stands_still_says_nothing() -> None:
     above = objects_above_table(frame, AboveTableParameters())
     known = renewed_pose_error(PoseError(), frame, above, frame, above, PARAMETERS)
     assert known.sigma(0.95) == (0.0, 0.0)
+
+
+def test_a_table_that_tilts_once_is_an_outlier_and_one_that_does_again_and_again_is_none() -> None:
+    frame, _ = DrawnScene(SIZES).frame(0, looking_down(), PLACES)
+    aside = replace(frame, X_WC=looking_down(0.002))
+    above = objects_above_table(frame, AboveTableParameters())
+
+    def after(known: PoseError, tilt: float, height: float) -> PoseError:
+        plane_W = np.array([np.sin(tilt), 0, np.cos(tilt), 0.0])
+        # The height is told amid the view, where that is on the table.
+        amid = table_change(frame, np.array([0, 0, 1.0, 0]), aside, plane_W)[1]
+        tilted = replace(above, plane_W=plane_W + np.array([0, 0, 0, height - amid]))
+        level = replace(above, plane_W=np.array([0, 0, 1.0, 0]))
+        return renewed_pose_error(known, frame, level, aside, tilted, PARAMETERS)
+
+    known = PoseError(tilt_squares=40 * 1e-8, height_squares=20 * 1e-8, frames=20)
+    # By one standard deviation of each of two angles, and of the height: as it is.
+    usual = after(known, np.arcsin(np.sqrt(2) * 1e-4), 1e-4)
+    assert usual.tilt_squares == pytest.approx((40 * 29 / 30 + 2) * 1e-8)
+    assert usual.height_squares == pytest.approx((20 * 29 / 30 + 1) * 1e-8, rel=1e-3)
+    # By a degree and 5 mm: three standard deviations, as large as they may be with that confidence.
+    once = after(known, np.radians(1), 0.005)
+    assert once.tilt_squares == pytest.approx((40 * 29 / 30 + 2 * 9 * 40 / chi2.ppf(0.05, 40)) * 1e-8)
+    assert once.height_squares == pytest.approx((20 * 29 / 30 + 9 * 20 / chi2.ppf(0.05, 20)) * 1e-8)
+    assert np.degrees(once.sigma(0.5)[0]) < 0.01
+    for _ in range(20):
+        once = after(once, np.radians(1), 0.005)
+    assert np.degrees(once.sigma(0.95)[0]) > 0.3  # of 0.7 about each of two axes, and nothing before that
+    # The first frame of all is believed.
+    first = after(PoseError(), np.radians(1), 0.005)
+    assert first.tilt_squares == pytest.approx(np.sin(np.radians(1)) ** 2)
+    assert first.height_squares == pytest.approx(0.005**2)
