@@ -7,9 +7,17 @@ from riseg_drake.kernels.compiled import compiled
 from riseg_drake.kernels.reading import between, nearest, projected
 
 
+@compiled()
+def _sinks(rises: NDArray[np.float32], pixel: NDArray[np.float32], n: int, depth: float) -> bool:
+    """Whether point n of `pixel` sinks by more than `depth`, m."""
+    rise = rises[0] * pixel[0, n] + rises[1] * pixel[1, n] + rises[2] + rises[3] * pixel[3, n]
+    return bool(rise < -depth * pixel[3, n])
+
+
 @compiled(
-    "UniTuple(float64[::1], 2)(float32[:, ::1], float32[::1], float32[::1], intp[::1], intp, float32[:, ::1],"
-    "float32[:, ::1], float32[:, ::1], float64, float64, float64, float64, float64, float64)"
+    "UniTuple(float64[::1], 3)(float32[:, ::1], float32[::1], float32[::1], intp[::1], intp, float32[:, ::1],"
+    "float32[::1], float32[:, ::1], float32[:, ::1], float64, float64, float64, float64, float64, float64,"
+    "float64)"
 )
 def misfits(
     pixel: NDArray[np.float32],
@@ -18,6 +26,7 @@ def misfits(
     owner: NDArray[np.intp],
     count: int,
     M: NDArray[np.float32],
+    rises: NDArray[np.float32],
     gray_1: NDArray[np.float32],
     depth_1: NDArray[np.float32],
     depth_noise: float,
@@ -26,8 +35,10 @@ def misfits(
     per_depth: float,
     most: float,
     expected: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Summed squared residuals of the points of N superpixels, and how many cannot be compared, both [N].
+    nearer: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Summed squared residuals of the points of N superpixels, how many cannot be compared, and of how many
+    something nearer is seen, all [N].
 
     What turns is shaded anew, and shadows come and go: a surface becomes darker by one factor and keeps its
     pattern. So the gray values of each superpixel may have changed by a factor, where that is likelier.
@@ -39,16 +50,20 @@ def misfits(
         owner: [W], 0..N-1, the superpixel of each.
         count: N.
         M: [3, 4], see `pixel_projection`.
+        rises: [4], metres by which a point rises from the table, divided by its depth z, are its product with
+            (u, v, 1, 1 / z).
         gray_1: [H, W], of the other view; NaN where there is nothing to compare.
         depth_1: [H, W], m; 0 where there is none.
         depth_noise: of the difference of two depths at 1 m, m.
         depth_error: share of depth by which it errs besides.
         certainty: 1 / variance of the factor, in the measure of a superpixel's squared residuals.
         per_depth: what a squared residual of depth counts beside one of gray.
-        most: squared residuals count no more than that.
-        expected: what a point counts that cannot be compared.
+        most: squared residuals count no more than that: beyond, they are no noise.
+        expected: what a point counts that cannot be compared, or is covered.
+        nearer: m; what is seen by more than that in front of a point, and by more than noise, covers it, if the
+            point has not sunk by half of that: into the table, behind itself.
     """
-    total, known, lost = np.zeros(count), np.zeros(count), np.zeros(count)
+    total, known, lost, covered = np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)
     before_after, before_before, of_gray = np.zeros(count), np.zeros(count), np.zeros(count)
     after = np.empty(len(gray), np.float32)
     for n in range(len(gray)):
@@ -59,16 +74,24 @@ def misfits(
             lost[p] += 1
             total[p] += expected
             continue
+        z, z_1 = c / pixel[3, n], nearest(depth_1, u, v)
+        variance = (depth_noise * z * z) ** 2 + (depth_error * z) ** 2
+        if (
+            0 < z_1 < z - nearer
+            and (z_1 - z) ** 2 > most * variance
+            and not _sinks(rises, pixel, n, nearer / 2)
+        ):
+            after[n] = np.nan
+            covered[p] += 1
+            total[p] += expected
+            continue
         known[p] += 1
         weighted = per_variance[n] * gray[n]
         before_after[p] += weighted * after[n]
         before_before[p] += weighted * gray[n]
         of_gray[p] += min(per_variance[n] * (after[n] - gray[n]) ** 2, most)
         total[p] += 1
-        z_1 = nearest(depth_1, u, v)
         if z_1 > 0:
-            z = c / pixel[3, n]
-            variance = (depth_noise * z * z) ** 2 + (depth_error * z) ** 2
             # Against what is right: depth that is not there says neither.
             total[p] += per_depth * (min((z_1 - z) ** 2 / variance, most) - 1)
     # The likeliest factor, by least squares, where the light seems to have changed; it costs once.
@@ -85,4 +108,4 @@ def misfits(
             of_factor[p] += min(per_variance[n] * (after[n] - factor[p] * gray[n]) ** 2 / noise, most)
     for p in range(count):
         total[p] += min(of_gray[p], of_factor[p])
-    return total, lost
+    return total, lost, covered

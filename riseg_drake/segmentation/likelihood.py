@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 from riseg_drake.kernels.misfits import misfits
 from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.expected_flow import pixel_projection
+from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.scales import CORRELATED_DEPTH, CORRELATED_GRAY, OUTLIER
 
 _SEEN = 0.25
 """Pixels of motion that an image shows."""
 EXPECTED = 2.0
 """Squared residuals of gray and depth, both, where a motion is right."""
+_NEARER = 0.01
+"""m; what is seen so much in front of a point is something else."""
 
 _USUAL_MOST = 2 * EXPECTED
 """Mean squared residual that is usual where a motion is right, at most: more says that most of what stands
@@ -52,6 +55,8 @@ class LikelihoodParameters:
     hidden: float = 1.0
     """Times the mean squared residual that is usual, by which a hidden point is worse than one that matches:
     few things go just where nobody can see them."""
+    covered: float = 0.15
+    """The same of a point before which something nearer is seen: a thing may well go behind another."""
     superpixel_max: float = 4.0
     """Nats that one superpixel may say for a motion against another: its errors are its own."""
 
@@ -66,13 +71,16 @@ class Costs:
     """[N], how many points each superpixel has."""
     lost: NDArray[np.float64]
     """[G, N], share of them that cannot be compared, as they are behind the robot or out of the image."""
+    covered: NDArray[np.float64]
+    """[G, N], share of them before which something nearer is seen."""
     leaves: NDArray[np.float64]
     """[N], share of them that the camera's own motion takes out of the image."""
 
     def with_motion(self, other: "Costs") -> "Costs":
         """These and other motions, for the same superpixels."""
         misfit, lost = np.vstack([self.misfit, other.misfit]), np.vstack([self.lost, other.lost])
-        return Costs(misfit, self.point_count, lost, self.leaves)
+        covered = np.vstack([self.covered, other.covered])
+        return Costs(misfit, self.point_count, lost, covered, self.leaves)
 
     @property
     def hidden(self) -> NDArray[np.float64]:
@@ -82,17 +90,28 @@ class Costs:
     def excess(self, parameters: LikelihoodParameters) -> NDArray[np.float64]:
         """[G, N], how much worse each motion is than one that is right would be, nats, bounded."""
         misfit, level, scale = self._by_noise(parameters)
-        excess = np.maximum(misfit - parameters.chance * level, 0)
+        excess = np.maximum(misfit - parameters.chance * level, 0) + parameters.hidden * level * self.covered
         return np.minimum(excess * scale, parameters.superpixel_max)
 
-    def nats(self, parameters: LikelihoodParameters) -> NDArray[np.float64]:
+    def nats(
+        self, parameters: LikelihoodParameters, *, which: NDArray[np.intp] | None = None
+    ) -> NDArray[np.float64]:
         """[G, N], how much worse than the best each motion is, by the noise that is there, bounded.
 
         A residual within the noise says no more than that: what is better by chance is no better. So a blank
         surface, which any motion along itself explains, speaks for none of them.
+
+        Args:
+            parameters: see there.
+            which: motions that are known to be there, which alone are compared: those may well take something
+                behind another thing. Of any motion that is asked about that says as little as what is hidden.
         """
         misfit, level, scale = self._by_noise(parameters)
         misfit = np.maximum(misfit, parameters.chance * level) + parameters.hidden * level * self.hidden
+        if which is None:
+            misfit += parameters.hidden * level * self.covered
+        else:
+            misfit = (misfit + parameters.covered * level * self.covered)[which]
         return np.minimum((misfit - misfit.min(0)) * scale, parameters.superpixel_max)
 
     def _by_noise(
@@ -105,7 +124,7 @@ class Costs:
         level = min(level, _USUAL_MOST)
         dispersion = max(1.0, level / EXPECTED)
         scale = self.point_count / (2 * parameters.correlated_gray * dispersion)
-        return self.misfit + self.lost * (level - EXPECTED), level, scale
+        return self.misfit + (self.lost + self.covered) * (level - EXPECTED), level, scale
 
 
 def motion_costs(
@@ -121,15 +140,15 @@ def motion_costs(
     seen = parameters.view_errors * compared.shift > _SEEN
     depth_factors = 1 + errs * np.array([0.0, -1.0, -0.5, 0.5, 1.0]) if seen else np.ones(1)
     seen_otherwise = parameters.light_view * compared.another_view
-    misfit, lost = np.empty((2, len(motions_K), keyframe.count))
+    misfit, lost, covered = np.empty((3, len(motions_K), keyframe.count))
     for k, motion in enumerate(motions_K):
         still = np.array_equal(motion, np.eye(4))
         light = np.hypot(parameters.light_still if still else parameters.light, seen_otherwise)
         factors = depth_factors if still else np.ones(1)
         tries = [_misfit(compared, motion, factor, float(light), parameters) for factor in factors]
-        misfit[k] = np.min([each for each, _ in tries], axis=0)
-        lost[k] = tries[0][1]
-    return Costs(misfit, keyframe.point_count.astype(float), lost, compared.leaves)
+        misfit[k] = np.min([each for each, _, _ in tries], axis=0)
+        _, lost[k], covered[k] = tries[0]
+    return Costs(misfit, keyframe.point_count.astype(float), lost, covered, compared.leaves)
 
 
 def unexplained_parts(nats: NDArray[np.float64], part: NDArray[np.intp]) -> NDArray[np.float64]:
@@ -149,8 +168,9 @@ def _misfit(
     depth_factor: float,
     light: float,
     parameters: LikelihoodParameters,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Mean squared residuals [N] of a motion [4, 4], and the share [N] of points that cannot be compared.
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Mean squared residuals [N] of a motion [4, 4], the share [N] of points that cannot be compared, and that
+    before which something nearer is seen.
 
     Depth is really that of both views by a factor, and light changes by a factor of the standard deviation
     `light`.
@@ -158,13 +178,14 @@ def _misfit(
     keyframe, frame = compared.keyframe, compared.frame
     projection = pixel_projection(compared.X_C1K @ motion_K, frame.intrinsics)
     projection[:, 3] /= depth_factor
-    total, lost = misfits(
+    total, lost, covered = misfits(
         keyframe.points.homogeneous,
         keyframe.gray,
         compared.per_variance,
         keyframe.owner,
         keyframe.count,
         projection,
+        _rises(keyframe, motion_K),
         frame.unhidden_gray,
         frame.unhidden_depth,
         float(np.sqrt(2)) * compared.depth_noise,
@@ -173,6 +194,16 @@ def _misfit(
         parameters.correlated_gray / parameters.correlated_depth,
         parameters.residual_max,
         EXPECTED,
+        _NEARER,
     )
     points = np.maximum(keyframe.point_count, 1)
-    return np.where(keyframe.point_count > 0, total / points, EXPECTED), lost / points
+    return np.where(keyframe.point_count > 0, total / points, EXPECTED), lost / points, covered / points
+
+
+def _rises(keyframe: Keyframe, motion_K: NDArray[np.float64]) -> NDArray[np.float32]:
+    """[4], of which the product with a point's (u, v, 1, 1 / z) is by how much a motion [4, 4] raises it above
+    the table, divided by its depth z."""
+    k, plane_K = keyframe.frame.intrinsics, keyframe.above.plane_W @ keyframe.frame.X_WC
+    x, y, z, w = plane_K @ (motion_K - np.eye(4))
+    x, y = x / k.fx, y / k.fy
+    return np.array([x, y, z - k.cx * x - k.cy * y, w], np.float32)

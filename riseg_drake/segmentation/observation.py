@@ -103,12 +103,13 @@ def observe(
             compared.pair, keyframe.edges, candidates_K, compared.depth_noise, parameters.alignment
         )
     motions_K = np.concatenate([np.eye(4)[None], candidates_K])
-    nats = motion_costs(compared, motions_K, parameters.likelihood).nats(parameters.likelihood)
+    costs = motion_costs(compared, motions_K, parameters.likelihood)
+    nats = costs.nats(parameters.likelihood)
     moves = _more_than_the_view_errs(compared, motions_K, nats, parameters.likelihood.view_errors)
-    motions_K, nats = motions_K[moves], nats[moves]
     price = motion_price(compared, parameters)
-    needed, motion = _fewest_motions(nats, keyframe, bond, part, price, parameters)
-    nats = nats[needed]
+    among, motion = _fewest_motions(nats[moves], keyframe, bond, part, price, parameters)
+    needed = np.flatnonzero(moves)[among]
+    nats = costs.nats(parameters.likelihood, which=needed)
     share = np.bincount(motion, keyframe.area, len(needed)) / max(1, keyframe.area.sum())
     share = np.maximum(share, parameters.outlier)
     share[0] = max(share[0], parameters.still_share)

@@ -11,8 +11,12 @@ PIECE = np.repeat([0, 1], 400)
 CERTAINTY = 2400.0
 """6 / 0.05^2: a factor of 0.95 or 1.05 costs 6 squared residuals."""
 MOST, EXPECTED, PER_DEPTH = 9.0, 2.0, 0.25
+NEARER = 0.01
+"""m; what is so much in front of a point covers it."""
 NO_DEPTH = np.zeros((21, 41), np.float32)
 ONTO_ITSELF = np.eye(3, 4, dtype=np.float32)
+LEVEL = np.zeros(4, np.float32)
+"""Nothing rises or sinks."""
 
 
 def pixels(count: int = 800) -> np.ndarray:
@@ -37,11 +41,11 @@ def noise(seed: int) -> np.ndarray:
 def costs(before: np.ndarray, after: np.ndarray, certainty: float = CERTAINTY) -> np.ndarray:
     """Of the gray values [2], where all pixels are seen again at their places."""
     per_variance = np.full(len(before), 1 / SIGMA**2, np.float32)
-    total, lost = misfits(
-        pixels(), before, per_variance, PIECE, 2, ONTO_ITSELF, image(after), NO_DEPTH,
-        0.003, 0.0, certainty, PER_DEPTH, MOST, EXPECTED,
+    total, lost, covered = misfits(
+        pixels(), before, per_variance, PIECE, 2, ONTO_ITSELF, LEVEL, image(after), NO_DEPTH,
+        0.003, 0.0, certainty, PER_DEPTH, MOST, EXPECTED, NEARER,
     )  # fmt: skip
-    np.testing.assert_array_equal(lost, 0)
+    np.testing.assert_array_equal([lost, covered], 0)
     return total - np.bincount(PIECE)
 
 
@@ -66,9 +70,9 @@ def test_the_factor_is_the_likeliest_one() -> None:
     before, ones = np.full(800, 100, np.float32), np.ones(800, np.float32)
     after = before.copy()
     after[0] = 90
-    total, _ = misfits(
-        pixels(), before, ones, np.arange(800), 800, ONTO_ITSELF, image(after), NO_DEPTH,
-        0.003, 0.0, 1e4, PER_DEPTH, 1e4, EXPECTED,
+    total, _, _ = misfits(
+        pixels(), before, ones, np.arange(800), 800, ONTO_ITSELF, LEVEL, image(after), NO_DEPTH,
+        0.003, 0.0, 1e4, PER_DEPTH, 1e4, EXPECTED, NEARER,
     )  # fmt: skip
     assert total[0] - 1 == pytest.approx((90 - 95) ** 2 + 1e4 * 0.05**2)
     np.testing.assert_array_equal(total[1:], 1)
@@ -82,24 +86,57 @@ def test_what_was_not_found_counts_as_expected_and_says_nothing_about_the_rest()
     before = pattern(0)
     after = image(0.5 * before + noise(1))
     after[5:8] = np.nan  # rows 4 to 7 cannot be read between pixels
-    total, lost = misfits(
-        pixels(), before, np.full(800, 1 / SIGMA**2, np.float32), PIECE, 2, ONTO_ITSELF, after, NO_DEPTH,
-        0.003, 0.0, CERTAINTY, PER_DEPTH, MOST, EXPECTED,
+    total, lost, covered = misfits(
+        pixels(), before, np.full(800, 1 / SIGMA**2, np.float32), PIECE, 2, ONTO_ITSELF, LEVEL, after, NO_DEPTH,
+        0.003, 0.0, CERTAINTY, PER_DEPTH, MOST, EXPECTED, NEARER,
     )  # fmt: skip
-    np.testing.assert_array_equal(lost, [160, 0])
+    np.testing.assert_array_equal([lost, covered], [[160, 0], [0, 0]])
     assert total[0] == pytest.approx(160 * EXPECTED + 240 * 2 + CERTAINTY * 0.25, rel=0.1)
 
 
-@pytest.mark.parametrize(("nearer", "error"), [(0.0, 0.0), (0.001, 0.0), (0.001, 0.01), (0.1, 0.0)])
+@pytest.mark.parametrize(
+    ("nearer", "error"), [(0.0, 0.0), (0.001, 0.0), (0.001, 0.01), (-0.1, 0.0), (0.009, 0.0), (0.02, 0.02)]
+)
 def test_depth_costs_its_squared_residual_less_what_is_right(nearer: float, error: float) -> None:
+    """Also where it is much farther, and where it is nearer by less than a centimetre or three deviations."""
     before = pattern(0)
     depth = np.full((21, 41), 0.5 - nearer, np.float32)
-    total, _ = misfits(
-        pixels(), before, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, image(before), depth,
-        0.004, error, CERTAINTY, PER_DEPTH, MOST, EXPECTED,
+    total, _, _ = misfits(
+        pixels(), before, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, LEVEL, image(before), depth,
+        0.004, error, CERTAINTY, PER_DEPTH, MOST, EXPECTED, NEARER,
     )  # fmt: skip
     squared = nearer**2 / ((0.004 * 0.25) ** 2 + (error * 0.5) ** 2)
     np.testing.assert_allclose(total / 400, 1 + PER_DEPTH * (min(squared, MOST) - 1), rtol=1e-3)
+
+
+def test_a_point_that_sinks_by_half_of_that_is_not_covered_but_wrong() -> None:
+    """A row of 40 sinks the more the farther right: by 5 mm from its 31st pixel on."""
+    before, depth = pattern(0), np.full((21, 41), 0.45, np.float32)
+    # At 0.5 m, metres are half of the product with (u, v, 1, 2).
+    sinks = np.array([-0.001, 0, 0, 0.5 * 0.0201], np.float32)
+    _, _, covered = misfits(
+        pixels(), before, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, sinks, image(before), depth,
+        0.003, 0.0, CERTAINTY, PER_DEPTH, MOST, EXPECTED, NEARER,
+    )  # fmt: skip
+    # (-0.001 u + 0.0201) / 2 < -0.005 from u = 31 on: nine of 40 columns, in ten rows of each piece.
+    np.testing.assert_array_equal(covered, [400 - 90, 400 - 90])
+
+
+@pytest.mark.parametrize("nearer", [0.011, 0.1])
+def test_a_point_behind_something_is_covered_and_counts_as_expected_whatever_is_seen_there(
+    nearer: float,
+) -> None:
+    """Of the first piece three rows of 40, whose gray is another one."""
+    before, depth = pattern(0), np.full((21, 41), 0.5, np.float32)
+    depth[:3] -= nearer
+    total, lost, covered = misfits(
+        pixels(), before, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, LEVEL,
+        image(np.where(np.arange(800) < 120, 0, before)), depth,
+        0.003, 0.0, CERTAINTY, PER_DEPTH, MOST, EXPECTED, NEARER,
+    )  # fmt: skip
+    np.testing.assert_array_equal([lost, covered], [[0, 0], [120, 0]])
+    right = 1 - PER_DEPTH
+    np.testing.assert_allclose(total, [120 * EXPECTED + 280 * right, 400 * right], rtol=1e-6)
 
 
 def test_under_any_motion_it_is_what_numpy_and_opencv_find() -> None:
@@ -108,23 +145,29 @@ def test_under_any_motion_it_is_what_numpy_and_opencv_find() -> None:
     depth_1 = rng.uniform(0.49, 0.51, (60, 80)).astype(np.float32)
     gray_1[20:30, 40:50] = np.nan
     depth_1[:, :10] = 0
+    depth_1[40:50, 20:60] -= 0.1
     u, v = rng.uniform(0, 79, 900), rng.uniform(0, 59, 900)
     pixel = np.stack([u, v, np.ones(900), 1 / rng.uniform(0.49, 0.51, 900)]).astype(np.float32)
     gray, owner = rng.uniform(100, 160, 900).astype(np.float32), np.sort(rng.integers(0, 12, 900))
     per_variance = rng.uniform(0.01, 0.1, 900).astype(np.float32)
     M = np.array([[1.02, 0.03, -2, 1.2], [-0.02, 0.98, 3, -0.8], [1e-4, -1e-4, 1, 0.004]], np.float32)
-    total, lost = misfits(
-        pixel, gray, per_variance, owner, 12, M, gray_1, depth_1,
-        0.003, 0.002, CERTAINTY, PER_DEPTH, MOST, EXPECTED,
+    total, lost, covered = misfits(
+        pixel, gray, per_variance, owner, 12, M, LEVEL, gray_1, depth_1,
+        0.003, 0.002, CERTAINTY, PER_DEPTH, MOST, EXPECTED, 0.05,
     )  # fmt: skip
 
     a, b, c = M @ pixel
     u_1, v_1 = (a / c)[None], (b / c)[None]
     after = cv2.remap(gray_1, u_1, v_1, cv2.INTER_LINEAR, borderMode=0, borderValue=np.nan)[0]
-    z_1 = cv2.remap(depth_1, u_1, v_1, cv2.INTER_NEAREST, borderMode=0, borderValue=0)[0]
+    u_n, v_n = np.rint(u_1[0]).astype(int), np.rint(v_1[0]).astype(int)
+    inside = (u_n >= 0) & (u_n < 80) & (v_n >= 0) & (v_n < 60)
+    z_1 = np.where(inside, depth_1[v_n.clip(0, 59), u_n.clip(0, 79)], 0)
     z = c / pixel[3]
-    known = np.isfinite(after)
-    np.testing.assert_allclose(lost, np.bincount(owner, ~known), atol=1)  # OpenCV reads at 1/32 of a pixel
+    behind = np.isfinite(after) & (z_1 > 0) & (z_1 < z - 0.05)
+    known = np.isfinite(after) & ~behind
+    # OpenCV reads at 1/32 of a pixel.
+    np.testing.assert_allclose(lost, np.bincount(owner, ~np.isfinite(after)), atol=1)
+    np.testing.assert_allclose(covered, np.bincount(owner, behind, 12), atol=1)
     expected = np.zeros(12)
     for p in range(12):
         mine = known & (owner == p)

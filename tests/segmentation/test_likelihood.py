@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.geometry.se3 import exp_se3
+from riseg_drake.segmentation import likelihood
 from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe
 from riseg_drake.segmentation.likelihood import Costs, LikelihoodParameters, motion_costs
@@ -87,7 +89,7 @@ def test_a_camera_that_stands_shows_nothing_of_how_depth_errs(plate: tuple[Keyfr
 def test_nats_are_squared_residuals_by_what_is_usual_and_no_more_than_a_superpixel_may_say() -> None:
     # 12 points count as 4, half of each squared residual; what is usual is 2, up to 3 may be by chance.
     misfit, points = np.array([[2.0, 2.0, 3.5], [2.5, 4.0, 2.0]]), np.array([12.0, 12.0, 12.0])
-    seen = np.zeros((2, 3)), np.zeros(3)
+    seen = np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(3)
     nats = Costs(misfit, points, *seen).nats(LikelihoodParameters())
     np.testing.assert_allclose(nats, [[0, 0, 0.5 * 2], [0, 1.0 * 2, 0]])
     twice = Costs(misfit, 100 * points, *seen).nats(LikelihoodParameters())
@@ -97,29 +99,49 @@ def test_nats_are_squared_residuals_by_what_is_usual_and_no_more_than_a_superpix
 def test_excess_is_what_no_motion_explains_beyond_what_may_be_by_chance() -> None:
     # As above, but against a motion that is right; the third is explained by neither, the fourth says too much.
     misfit, points = np.array([[2.0, 2.0, 5.0, 18.0], [2.5, 4.0, 4.0, 2.0]]), np.full(4, 12.0)
-    excess = Costs(misfit, points, np.zeros((2, 4)), np.zeros(4)).excess(LikelihoodParameters())
+    excess = Costs(misfit, points, *np.zeros((2, 2, 4)), np.zeros(4)).excess(LikelihoodParameters())
     np.testing.assert_allclose(excess, [[0, 0, 2.0 * 2, 4], [0, 1.0 * 2, 1.0 * 2, 0]])
 
 
 def test_what_a_motion_hides_is_no_match_but_worse_by_what_is_usual() -> None:
     # The second motion hides half of it. What is usual is 2: half of that, for 12 points that count as 4.
     misfit, points = np.array([[2.5], [2.0]]), np.array([12.0])
-    nats = Costs(misfit, points, np.array([[0.0], [0.5]]), np.zeros(1)).nats(LikelihoodParameters())
-    np.testing.assert_allclose(nats, [[0], [0.5 * 2 * 12 / 3 / 2]])
-    without = Costs(misfit, points, np.array([[0.0], [0.5]]), np.zeros(1)).nats(
-        LikelihoodParameters(hidden=0.0)
-    )
-    np.testing.assert_array_equal(without, [[0], [0]])
+    costs = Costs(misfit, points, np.array([[0.0], [0.5]]), np.zeros((2, 1)), np.zeros(1))
+    np.testing.assert_allclose(costs.nats(LikelihoodParameters()), [[0], [0.5 * 2 * 12 / 3 / 2]])
+    np.testing.assert_array_equal(costs.nats(LikelihoodParameters(hidden=0.0)), [[0], [0]])
+
+
+def test_what_goes_behind_something_is_hardly_worse_than_a_match_by_a_motion_that_is_known() -> None:
+    # Half of it: 0.15 of what is usual, 2, for 12 points that count as 4; a match with 2.5 is usual itself.
+    misfit, points = np.array([[2.5], [2.0], [2.0]]), np.array([12.0])
+    covered = np.array([[0.0], [0.5], [1.0]])
+    costs = Costs(misfit, points, np.zeros((3, 1)), covered, np.zeros(1))
+    known = costs.nats(LikelihoodParameters(), which=np.array([0, 1]))
+    np.testing.assert_allclose(known, [[0], [0.5 * 0.15 * 2 * 12 / 3 / 2]])
+    # Of what is only asked about, it counts as what is hidden.
+    np.testing.assert_allclose(costs.nats(LikelihoodParameters()), [[0], [0.5 * 2 * 12 / 3 / 2], [4]])
+    np.testing.assert_allclose(costs.excess(LikelihoodParameters()), [[0], [0.5 * 2 * 12 / 3 / 2], [4]])
+
+
+def test_what_is_covered_counts_as_what_is_usual_however_little_noise_there_is() -> None:
+    # Three superpixels match with 1.0 where 2 was thought usual; the fourth is covered and counts as 2.
+    misfit, points = np.array([[1.0, 1.0, 1.0, 2.0], [9.0, 9.0, 9.0, 1.0]]), np.full(4, 12.0)
+    covered = np.array([[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 0.0]])
+    costs = Costs(misfit, points, np.zeros((2, 4)), covered, np.zeros(4))
+    nats = costs.nats(LikelihoodParameters(), which=np.array([0, 1]))
+    np.testing.assert_allclose(nats[:, 3], [0.15 * 12 / 3 / 2, 0])
 
 
 def test_what_cannot_be_compared_is_missed_by_no_motion_however_little_noise_there_is() -> None:
     # Three superpixels match with 1.0 where 2 was thought usual; the fourth left the view and counts as 2.
     misfit, points = np.array([[1.0, 1.0, 1.0, 2.0]]), np.full(4, 12.0)
     lost = np.array([[0.0, 0.0, 0.0, 1.0]])
-    np.testing.assert_array_equal(Costs(misfit, points, lost, lost[0]).excess(LikelihoodParameters()), 0)
+    np.testing.assert_array_equal(
+        Costs(misfit, points, lost, 0 * lost, lost[0]).excess(LikelihoodParameters()), 0
+    )
     # Half of it in view, and that wrong: 0.5 x 2 + 0.5 x 9, where 0.5 x 1 + 0.5 x 9 is meant.
     misfit[0, 3], lost[0, 3] = 5.5, 0.5
-    excess = Costs(misfit, points, lost, lost[0]).excess(LikelihoodParameters(superpixel_max=99.0))
+    excess = Costs(misfit, points, lost, 0 * lost, lost[0]).excess(LikelihoodParameters(superpixel_max=99.0))
     np.testing.assert_allclose(excess[0], [0, 0, 0, (5.0 - 1.5) * 12 / 3 / 2])
 
 
@@ -168,9 +190,26 @@ def test_where_most_is_explained_by_nothing_yet_that_is_not_taken_for_noise():
     # Ten superpixels of 12 points each, two nats a squared residual, of which a motion explains three.
     misfit = np.full((2, 10), 9.0)
     misfit[1, :3] = 1.0
-    costs = Costs(misfit, np.full(10, 12.0), np.zeros((2, 10)), np.zeros(10))
+    costs = Costs(misfit, np.full(10, 12.0), *np.zeros((2, 2, 10)), np.zeros(10))
     parameters = LikelihoodParameters(chance=1.5, correlated_gray=3.0, superpixel_max=99.0)
     # What is usual is twice what is expected at most, 4, so that 6 may be by chance, and it disperses by 2.
     expected = np.zeros((2, 10))
     expected[0, :3] = (9 - 6) * 12 / (2 * 3 * 2)
     np.testing.assert_allclose(costs.nats(parameters), expected)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.6])
+def test_how_far_a_motion_raises_a_point_is_the_change_of_its_height_above_the_table(
+    plate: tuple[Keyframe, Frame], tilt: float
+) -> None:
+    keyframe, _ = plate
+    rng = np.random.default_rng(2)
+    plane_W = np.array([np.sin(tilt), 0, np.cos(tilt), -0.1])
+    keyframe = replace(keyframe, above=replace(keyframe.above, plane_W=plane_W))
+    motion = exp_se3(rng.normal(0, 0.3, 6))
+    u, v, z = rng.uniform(0, 400, 20), rng.uniform(0, 300, 20), rng.uniform(0.3, 0.6, 20)
+    k = keyframe.frame.intrinsics
+    p_K = np.stack([(u - k.cx) / k.fx * z, (v - k.cy) / k.fy * z, z, np.ones(20)])
+    height = plane_W @ keyframe.frame.X_WC @ np.stack([p_K, motion @ p_K])
+    rises = z * (likelihood._rises(keyframe, motion) @ np.stack([u, v, np.ones(20), 1 / z]))
+    np.testing.assert_allclose(rises, height[1] - height[0], atol=1e-6)
