@@ -76,11 +76,12 @@ def agreeing(look: Look, poses: Mapping[int, NDArray[np.float64]]) -> Look:
     """The same with poses that agree with the reference's own `poses` [4, 4], by frame number, as far as known.
 
     Poses that err are set right within a pair (`camera_motion`), whose reference has the pose it came with,
-    and errs with that against the keyframe. The pose that was set right when it was new does not.
+    and errs with that against the keyframe. The pose that was set right when it was new does not. Poses that
+    are exact, with a residual of 0, agree as they are.
     """
     reference, current = look.pair.reference, look.pair.current
     X_WC0 = poses.get(reference.sequence)
-    if X_WC0 is None or np.array_equal(X_WC0, reference.X_WC):
+    if X_WC0 is None or look.pair.residual == 0 or np.array_equal(X_WC0, reference.X_WC):
         return look
     X_AW = X_WC0 @ inverse(reference.X_WC)  # from the world as it came to the one that agrees
 

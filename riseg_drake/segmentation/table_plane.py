@@ -164,7 +164,8 @@ def _worth(
     height += planes[:, 3:].astype(np.float32)
     within = tolerance.astype(np.float32)
     weight = nearness.astype(np.float32)
-    on = (np.abs(height) <= within) @ weight
+    # Nearer counts more (MSAC): a plane between a table and a low tile holds both, and neither well.
+    on = np.maximum(1 - np.square(height / within), 0) @ weight
     below = ((height < -within) & (height > -parameters.object_height)) @ weight
     above = (height > parameters.object_height) @ weight
     normal = planes[:, :3]

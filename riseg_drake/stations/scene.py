@@ -16,10 +16,13 @@ from riseg_drake.stations.settling import lay_pile, settle
 __all__ = ["PlacedConfig", "SceneConfig", "draw_scene", "make_scene", "place_scene"]
 
 DROP = 2e-4  # m; how far above its resting height an object starts
-LAYOUTS_OF_A_CHOICE = 5  # whole layouts tried of the same objects, before others are drawn
-CHOICES = (
-    4  # of objects tried at least before a scene is called impossible; half of them before fewer are drawn
-)
+LAYOUTS_OF_A_CHOICE = 5
+"""Whole layouts tried of the same objects, before others are drawn."""
+FULL_CHOICES = 2
+"""Of objects drawn, before fewer are."""
+CHOICES, FEW_CHOICES = 30, 4
+"""Of objects drawn before a scene is called impossible: for want of room, and where each takes seconds, as all
+must come to rest."""
 
 
 class _Layout(NamedTuple):
@@ -111,7 +114,7 @@ def draw_scene(config: SceneConfig, rng: np.random.Generator) -> list[PlacedObje
     count = int(rng.integers(kind.count_min, min(kind.count_max, len(models)) + 1))
     restless = ""
     for choice in itertools.count():
-        if choice >= CHOICES // 2:  # so many have no room
+        if choice >= FULL_CHOICES:  # so many have no room
             count = max(kind.count_min, count - 1)
         chosen = [models[i] for i in rng.permutation(len(models))[:count]]
         if config.layout != "spread":  # the large ones first: the others find room about them, and on them
@@ -126,7 +129,8 @@ def draw_scene(config: SceneConfig, rng: np.random.Generator) -> list[PlacedObje
             restless = _restless(laid, at_rest)
             if not restless:
                 return at_rest
-        if choice + 1 >= CHOICES and count == kind.count_min:
+        takes_long = restless or config.layout == "pile"
+        if choice + 1 >= (FEW_CHOICES if takes_long else CHOICES) and count == kind.count_min:
             break
     if restless:
         raise SceneError(f"{restless}; model it with z up, standing on a face or on three points or more")

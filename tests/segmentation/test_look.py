@@ -20,7 +20,9 @@ DRIFT = exp_se3(np.array([0.01, -0.02, 0.03, 0.004, -0.002, 0.005]))
 def look() -> Look:
     frames = [SCENE.frame(k, looking_down(0.02 * k), PLACES)[0] for k in range(2)]
     above = standing(frames[1], frames[1].depth < 0.44)
-    return Look(FramePair(*frames), above, lambda: replace(above), EvidenceParameters(), BFIFParameters())
+    return Look(
+        FramePair(*frames, residual=0.1), above, lambda: replace(above), EvidenceParameters(), BFIFParameters()
+    )
 
 
 def heights(above: AboveTable, X_WC: np.ndarray) -> np.ndarray:
@@ -50,6 +52,11 @@ def test_the_table_goes_along_and_things_stay_as_high_above_it(look: Look) -> No
 def test_where_nothing_else_is_known_of_the_reference_all_stays_as_it_is(look: Look, known) -> None:
     poses = {0: look.pair.reference.X_WC.copy()} if known is None else known
     assert agreeing(look, poses) is look
+
+
+def test_poses_that_are_exact_agree_as_they_are(look: Look) -> None:
+    exact = replace(look, pair=replace(look.pair, residual=0.0))
+    assert agreeing(exact, {0: DRIFT @ look.pair.reference.X_WC}) is exact
 
 
 def test_the_whole_of_what_stands_there_is_looked_at_once_and_only_where_it_is_asked_for(look: Look) -> None:
