@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.kernels.compiled import compiled
-from riseg_drake.kernels.reading import between, nearest, projected
+from riseg_drake.kernels.reading import Real, between, nearest, projected
 
 
 @compiled()
@@ -14,10 +14,22 @@ def _sinks(rises: NDArray[np.float32], pixel: NDArray[np.float32], n: int, depth
     return bool(rise < -depth * pixel[3, n])
 
 
+@compiled()
+def _stood(
+    back: NDArray[np.float32], u: Real, v: Real, z: Real, depth_0: NDArray[np.float32], near: Real
+) -> bool:
+    """Whether what is seen at (u, v) and depth z, m, was seen there before, within `near`, m."""
+    u, v, per_z = np.floor(u + np.float32(0.5)), np.floor(v + np.float32(0.5)), 1 / z
+    c = back[2, 0] * u + back[2, 1] * v + back[2, 2] + back[2, 3] * per_z
+    a = back[0, 0] * u + back[0, 1] * v + back[0, 2] + back[0, 3] * per_z
+    b = back[1, 0] * u + back[1, 1] * v + back[1, 2] + back[1, 3] * per_z
+    return bool(c > 0 and abs(nearest(depth_0, a / c, b / c) - c * z) < near)
+
+
 @compiled(
     "UniTuple(float64[::1], 3)(float32[:, ::1], float32[::1], float32[::1], intp[::1], intp, float32[:, ::1],"
-    "float32[::1], float32[:, ::1], float32[:, ::1], float64, float64, float64, float64, float64, float64,"
-    "float64)"
+    "float32[::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], float64, float64,"
+    "float64, float64, float64, float64, float64)"
 )
 def misfits(
     pixel: NDArray[np.float32],
@@ -29,6 +41,8 @@ def misfits(
     rises: NDArray[np.float32],
     gray_1: NDArray[np.float32],
     depth_1: NDArray[np.float32],
+    back: NDArray[np.float32],
+    depth_0: NDArray[np.float32],
     depth_noise: float,
     depth_error: float,
     certainty: float,
@@ -54,14 +68,16 @@ def misfits(
             (u, v, 1, 1 / z).
         gray_1: [H, W], of the other view; NaN where there is nothing to compare.
         depth_1: [H, W], m; 0 where there is none.
+        back: [3, 4], as M, from the other view to this, for what stands still.
+        depth_0: [H, W], of this view, m.
         depth_noise: of the difference of two depths at 1 m, m.
         depth_error: share of depth by which it errs besides.
         certainty: 1 / variance of the factor, in the measure of a superpixel's squared residuals.
         per_depth: what a squared residual of depth counts beside one of gray.
         most: squared residuals count no more than that: beyond, they are no noise.
         expected: what a point counts that cannot be compared, or is covered.
-        nearer: m; what is seen by more than that in front of a point, and by more than noise, covers it, if the
-            point has not sunk by half of that: into the table, behind itself.
+        nearer: m; what is seen by more than that in front of a point, and by more than noise, covers it, if it
+            stood there before, and the point has not sunk by half of that: into the table, behind itself.
     """
     total, known, lost, covered = np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)
     before_after, before_before, of_gray = np.zeros(count), np.zeros(count), np.zeros(count)
@@ -76,11 +92,8 @@ def misfits(
             continue
         z, z_1 = c / pixel[3, n], nearest(depth_1, u, v)
         variance = (depth_noise * z * z) ** 2 + (depth_error * z) ** 2
-        if (
-            0 < z_1 < z - nearer
-            and (z_1 - z) ** 2 > most * variance
-            and not _sinks(rises, pixel, n, nearer / 2)
-        ):
+        in_front = 0 < z_1 < z - nearer and (z_1 - z) ** 2 > most * variance
+        if in_front and _stood(back, u, v, z_1, depth_0, nearer) and not _sinks(rises, pixel, n, nearer / 2):
             after[n] = np.nan
             covered[p] += 1
             total[p] += expected

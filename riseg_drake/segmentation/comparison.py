@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
+from riseg_drake.geometry.se3 import inverse
+from riseg_drake.segmentation.expected_flow import pixel_projection
 from riseg_drake.segmentation.frame_pairs import camera_span
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.surface import seek
@@ -75,6 +77,11 @@ class Comparison(Immutable):
     def X_C1K(self) -> NDArray[np.float64]:
         """[4, 4], from the keyframe's camera to the frame's, as the poses have it."""
         return self.pair.X_C1C0
+
+    @cached_property
+    def back(self) -> NDArray[np.float32]:
+        """[3, 4], the `pixel_projection` from the frame to the keyframe."""
+        return pixel_projection(inverse(self.X_C1K), self.frame.intrinsics)
 
     @cached_property
     def another_view(self) -> float:

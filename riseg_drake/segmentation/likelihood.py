@@ -56,7 +56,8 @@ class LikelihoodParameters:
     """Times the mean squared residual that is usual, by which a hidden point is worse than one that matches:
     few things go just where nobody can see them."""
     covered: float = 0.15
-    """The same of a point before which something nearer is seen: a thing may well go behind another."""
+    """The same of a point before which something nearer is seen that stood there before: a thing may well go
+    behind another. What came there hides it, as a hand does."""
     superpixel_max: float = 4.0
     """Nats that one superpixel may say for a motion against another: its errors are its own."""
 
@@ -188,6 +189,8 @@ def _misfit(
         _rises(keyframe, motion_K),
         frame.unhidden_gray,
         frame.unhidden_depth,
+        compared.back,
+        keyframe.frame.depth,
         float(np.sqrt(2)) * compared.depth_noise,
         compared.depth_error,
         parameters.correlated_gray / light**2,

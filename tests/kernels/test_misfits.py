@@ -17,6 +17,8 @@ NO_DEPTH = np.zeros((21, 41), np.float32)
 ONTO_ITSELF = np.eye(3, 4, dtype=np.float32)
 LEVEL = np.zeros(4, np.float32)
 """Nothing rises or sinks."""
+UNKNOWN = (NO_DEPTH, ONTO_ITSELF, NO_DEPTH)
+"""Depth of the other view, the way back, and depth of the first."""
 
 
 def pixels(count: int = 800) -> np.ndarray:
@@ -42,7 +44,7 @@ def costs(before: np.ndarray, after: np.ndarray, certainty: float = CERTAINTY) -
     """Of the gray values [2], where all pixels are seen again at their places."""
     per_variance = np.full(len(before), 1 / SIGMA**2, np.float32)
     total, lost, covered = misfits(
-        pixels(), before, per_variance, PIECE, 2, ONTO_ITSELF, LEVEL, image(after), NO_DEPTH,
+        pixels(), before, per_variance, PIECE, 2, ONTO_ITSELF, LEVEL, image(after), *UNKNOWN,
         0.003, 0.0, certainty, PER_DEPTH, MOST, EXPECTED, NEARER,
     )  # fmt: skip
     np.testing.assert_array_equal([lost, covered], 0)
@@ -71,7 +73,7 @@ def test_the_factor_is_the_likeliest_one() -> None:
     after = before.copy()
     after[0] = 90
     total, _, _ = misfits(
-        pixels(), before, ones, np.arange(800), 800, ONTO_ITSELF, LEVEL, image(after), NO_DEPTH,
+        pixels(), before, ones, np.arange(800), 800, ONTO_ITSELF, LEVEL, image(after), *UNKNOWN,
         0.003, 0.0, 1e4, PER_DEPTH, 1e4, EXPECTED, NEARER,
     )  # fmt: skip
     assert total[0] - 1 == pytest.approx((90 - 95) ** 2 + 1e4 * 0.05**2)
@@ -87,7 +89,7 @@ def test_what_was_not_found_counts_as_expected_and_says_nothing_about_the_rest()
     after = image(0.5 * before + noise(1))
     after[5:8] = np.nan  # rows 4 to 7 cannot be read between pixels
     total, lost, covered = misfits(
-        pixels(), before, np.full(800, 1 / SIGMA**2, np.float32), PIECE, 2, ONTO_ITSELF, LEVEL, after, NO_DEPTH,
+        pixels(), before, np.full(800, 1 / SIGMA**2, np.float32), PIECE, 2, ONTO_ITSELF, LEVEL, after, *UNKNOWN,
         0.003, 0.0, CERTAINTY, PER_DEPTH, MOST, EXPECTED, NEARER,
     )  # fmt: skip
     np.testing.assert_array_equal([lost, covered], [[160, 0], [0, 0]])
@@ -103,6 +105,7 @@ def test_depth_costs_its_squared_residual_less_what_is_right(nearer: float, erro
     depth = np.full((21, 41), 0.5 - nearer, np.float32)
     total, _, _ = misfits(
         pixels(), before, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, LEVEL, image(before), depth,
+        ONTO_ITSELF, depth,
         0.004, error, CERTAINTY, PER_DEPTH, MOST, EXPECTED, NEARER,
     )  # fmt: skip
     squared = nearer**2 / ((0.004 * 0.25) ** 2 + (error * 0.5) ** 2)
@@ -116,6 +119,7 @@ def test_a_point_that_sinks_by_half_of_that_is_not_covered_but_wrong() -> None:
     sinks = np.array([-0.001, 0, 0, 0.5 * 0.0201], np.float32)
     _, _, covered = misfits(
         pixels(), before, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, sinks, image(before), depth,
+        ONTO_ITSELF, depth,
         0.003, 0.0, CERTAINTY, PER_DEPTH, MOST, EXPECTED, NEARER,
     )  # fmt: skip
     # (-0.001 u + 0.0201) / 2 < -0.005 from u = 31 on: nine of 40 columns, in ten rows of each piece.
@@ -132,11 +136,25 @@ def test_a_point_behind_something_is_covered_and_counts_as_expected_whatever_is_
     total, lost, covered = misfits(
         pixels(), before, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, LEVEL,
         image(np.where(np.arange(800) < 120, 0, before)), depth,
+        ONTO_ITSELF, depth,
         0.003, 0.0, CERTAINTY, PER_DEPTH, MOST, EXPECTED, NEARER,
     )  # fmt: skip
     np.testing.assert_array_equal([lost, covered], [[0, 0], [120, 0]])
     right = 1 - PER_DEPTH
     np.testing.assert_allclose(total, [120 * EXPECTED + 280 * right, 400 * right], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("before", "stood"), [(0.45, True), (0.455, True), (0.439, False), (0.5, False), (0, False)]
+)
+def test_what_came_there_since_covers_nothing(before: float, stood: bool) -> None:
+    values, depth_0 = pattern(0), np.full((21, 41), before, np.float32)
+    depth = np.full((21, 41), 0.45, np.float32)
+    _, _, covered = misfits(
+        pixels(), values, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, LEVEL, image(values), depth,
+        ONTO_ITSELF, depth_0, 0.003, 0.0, CERTAINTY, PER_DEPTH, MOST, EXPECTED, NEARER,
+    )  # fmt: skip
+    np.testing.assert_array_equal(covered, [400 * stood, 400 * stood])
 
 
 def test_under_any_motion_it_is_what_numpy_and_opencv_find() -> None:
@@ -150,9 +168,12 @@ def test_under_any_motion_it_is_what_numpy_and_opencv_find() -> None:
     pixel = np.stack([u, v, np.ones(900), 1 / rng.uniform(0.49, 0.51, 900)]).astype(np.float32)
     gray, owner = rng.uniform(100, 160, 900).astype(np.float32), np.sort(rng.integers(0, 12, 900))
     per_variance = rng.uniform(0.01, 0.1, 900).astype(np.float32)
+    # What is seen at (u, v) was at (u + 5, v - 3); on the right something else stood there.
+    back = np.array([[1, 0, 5, 0], [0, 1, -3, 0], [0, 0, 1, 0]], np.float32)
+    depth_0 = np.where(np.arange(80) < 50, 0.4, 0.2) * np.ones((60, 1))
     M = np.array([[1.02, 0.03, -2, 1.2], [-0.02, 0.98, 3, -0.8], [1e-4, -1e-4, 1, 0.004]], np.float32)
     total, lost, covered = misfits(
-        pixel, gray, per_variance, owner, 12, M, LEVEL, gray_1, depth_1,
+        pixel, gray, per_variance, owner, 12, M, LEVEL, gray_1, depth_1, back, depth_0.astype(np.float32),
         0.003, 0.002, CERTAINTY, PER_DEPTH, MOST, EXPECTED, 0.05,
     )  # fmt: skip
 
@@ -163,7 +184,8 @@ def test_under_any_motion_it_is_what_numpy_and_opencv_find() -> None:
     inside = (u_n >= 0) & (u_n < 80) & (v_n >= 0) & (v_n < 60)
     z_1 = np.where(inside, depth_1[v_n.clip(0, 59), u_n.clip(0, 79)], 0)
     z = c / pixel[3]
-    behind = np.isfinite(after) & (z_1 > 0) & (z_1 < z - 0.05)
+    behind = np.isfinite(after) & (z_1 > 0) & (z_1 < z - 0.05) & (u_n + 5 < 50)
+    assert 20 < behind.sum() < 80
     known = np.isfinite(after) & ~behind
     # OpenCV reads at 1/32 of a pixel.
     np.testing.assert_allclose(lost, np.bincount(owner, ~np.isfinite(after)), atol=1)
