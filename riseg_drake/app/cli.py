@@ -10,7 +10,7 @@ from riseg_drake.app import commands
 from riseg_drake.app.arguments import command_line
 from riseg_drake.app.parser import BAD_INPUT
 from riseg_drake.host.processes import Stop, stopped_by_signals
-from riseg_drake.host.terminal import can_write, drop_output, nobody_reads, tell_error
+from riseg_drake.host.terminal import can_write, drop_output, nobody_reads, tell_error, tell_notices
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -22,6 +22,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Of a library that only evaluations with several jobs use, and these say it themselves.
     warnings.filterwarnings("ignore", message=".*joblib will operate in serial mode", category=UserWarning)
+    tell_notices()
     code = 0
     with stopped_by_signals(commands.__file__, __file__) as stop:
         try:

@@ -3,7 +3,9 @@
 import os
 import select
 import sys
+import warnings
 from contextlib import suppress
+from typing import Any
 
 LONGEST_LINE = 600
 """Characters; of a longer one the middle is left out."""
@@ -23,6 +25,23 @@ def tell_error(text: object) -> None:
     """Say on the error stream, in one line, what is wrong; silently where nobody can hear it."""
     with suppress(OSError, ValueError):
         print(f"riseg: {one_line(text)}", file=sys.stderr, flush=True)
+
+
+class Notice(UserWarning):
+    """What a person should know though the work goes on, in one line."""
+
+
+def tell_notices() -> None:
+    """Say notices as errors are said, in one line each; other warnings stay as they are."""
+    show = warnings.showwarning
+
+    def tell(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+        if issubclass(category, Notice):
+            tell_error(message)
+        else:
+            show(message, category, *where, **more)
+
+    warnings.showwarning = tell
 
 
 def nobody_reads() -> bool:

@@ -1,6 +1,7 @@
 """The models that a scene may be drawn from: one rigid body each, found in a folder and measured."""
 
 import os
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
@@ -17,7 +18,7 @@ from pydrake.multibody.tree import RigidBody
 from scipy.spatial import ConvexHull, QhullError
 
 from riseg_drake.host.model_files import ModelFileError, reading_model
-from riseg_drake.host.terminal import one_line
+from riseg_drake.host.terminal import Notice, one_line
 from riseg_drake.robot.description import find_packages, register_models
 from riseg_drake.robot.shape_corners import shape_corners
 from riseg_drake.stations.contact import touches_over_area
@@ -31,6 +32,10 @@ HEAVIEST = 20.0
 INERTIA_SHARE = 4.0
 """Of the largest moment of inertia that a body of an object's mass and collision shape can have: the shape may
 be simpler than the body."""
+
+
+_FEW = 5
+"""Models that are named."""
 
 
 class SceneError(ValueError):
@@ -81,7 +86,9 @@ def find_models(folders: str | Sequence[str], names: Sequence[str] = ()) -> list
     unknown = sorted(set(names) - set(paths))
     if unknown:
         raise SceneError(f"names: no model {', '.join(unknown)}; there are {', '.join(sorted(paths))}")
-    return [measure(name, paths[name]) for name in sorted(names or paths)]
+    models = [measure(name, paths[name]) for name in sorted(names or paths)]
+    _tell_without_inertia(models)
+    return models
 
 
 def find_model(path_or_url: str) -> ObjectModel:
@@ -94,7 +101,9 @@ def find_model(path_or_url: str) -> ObjectModel:
         (path,) = found
     if not path.is_file():
         raise SceneError(f"model: no file {path}; expected an SDF or URDF model")
-    return measure(path.parent.name if path.stem == "model" else path.stem, path)
+    model = measure(path.parent.name if path.stem == "model" else path.stem, path)
+    _tell_without_inertia([model])
+    return model
 
 
 def parse_body(plant: MultibodyPlant, path: Path) -> RigidBody:
@@ -213,6 +222,19 @@ def _check_size(path: Path, body: RigidBody, corners: NDArray) -> None:
         raise SceneError(
             f"{path} has a moment of inertia of {largest:.3g} kg m^2; "
             f"of its mass and size it is {most:.2g} at most"
+        )
+
+
+def _tell_without_inertia(models: Sequence[ObjectModel]) -> None:
+    """Give notice of those whose inertia is SDF's own."""
+    silent = [model.name for model in models if model.path.suffix == ".sdf" and not _says_inertia(model.path)]
+    if silent:
+        few = ", ".join(silent[:_FEW]) + (", ..." if len(silent) > _FEW else "")
+        warnings.warn(
+            f"{len(silent)} of {len(models)} models say no moment of inertia ({few}): "
+            "SDF makes 1 kg m^2 of that, and a push hardly turns them; say <inertia>",
+            Notice,
+            stacklevel=3,
         )
 
 

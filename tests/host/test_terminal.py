@@ -2,11 +2,12 @@
 
 import subprocess
 import sys
+import warnings
 
 import pytest
 
 from riseg_drake.app.cli import main
-from riseg_drake.host.terminal import LONGEST_LINE, one_line
+from riseg_drake.host.terminal import LONGEST_LINE, Notice, one_line, tell_notices
 
 
 def test_line_ends_and_what_commands_a_terminal_are_taken_out():
@@ -32,3 +33,13 @@ def test_an_output_without_room_is_one_line_and_exit_code_2():
         done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert done.returncode == 2
     assert done.stderr == "riseg: the output: No space left on device\n"
+
+
+def test_a_notice_is_one_line_on_the_error_stream_and_other_warnings_stay_as_they_are(capsys, monkeypatch):
+    others = []
+    monkeypatch.setattr(warnings, "showwarning", lambda message, *more: others.append(str(message)))
+    tell_notices()
+    warnings.showwarning(Notice("seven\nmodels"), Notice, "file.py", 3)
+    warnings.showwarning(UserWarning("careful"), UserWarning, "file.py", 4)
+    assert capsys.readouterr().err == "riseg: seven models\n"
+    assert others == ["careful"]

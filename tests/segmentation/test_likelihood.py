@@ -5,14 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from riseg_drake.geometry.camera import project
 from riseg_drake.geometry.rgbd import Frame
-from riseg_drake.geometry.se3 import exp_se3
+from riseg_drake.geometry.se3 import exp_se3, inverse
 from riseg_drake.segmentation import likelihood
 from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters, make_keyframe
 from riseg_drake.segmentation.likelihood import Costs, LikelihoodParameters, motion_costs
 from riseg_drake.segmentation.noise import MeasurementNoise
-from tests.segmentation.drawn_scene import Blank, DrawnScene, looking_down, planar, standing
+from tests.segmentation.drawn_scene import CAMERA, Blank, DrawnScene, looking_down, planar, standing
 
 pytestmark = pytest.mark.renders
 
@@ -166,6 +167,35 @@ def test_what_leaves_the_image_by_the_cameras_own_motion_is_not_hidden(plate: tu
     compared = Comparison(keyframe, away[0], DEPTH_NOISE, view_error=0.01)
     hidden = motion_costs(compared, np.array([np.eye(4), back]), LikelihoodParameters()).hidden
     np.testing.assert_array_equal(hidden, 0)
+
+
+@pytest.mark.parametrize("aside", [0.0, 0.03], ids=["the same view", "another view"])
+@pytest.mark.parametrize("stood", [True, False], ids=["stood there", "came there"])
+def test_a_tile_that_slides_under_a_rim_is_covered_by_what_stood_there_alone(aside: float, stood: bool) -> None:
+    """By 2 cm; the rim, 6 cm above the table, hides a strip of it that was in sight."""
+    scene = DrawnScene([(0.1, 0.08, 0.008), (0.06, 0.1, 0.06)])
+    X_WK, rim = looking_down(), planar(0.09, 0.0)
+    first, label = scene.frame(0, X_WK, [planar(0, 0), rim if stood else planar(0.09, 0.3)])
+    second, after = scene.frame(1, looking_down(aside), [planar(0.02, 0), rim])
+    above = standing(first, label > 0)
+    keyframe = make_keyframe(first, above, MeasurementNoise(), KeyframeParameters())
+    motion = inverse(X_WK) @ planar(0.02, 0) @ X_WK
+    compared = Comparison(keyframe, second, DEPTH_NOISE, view_error=0.0)
+    costs = motion_costs(compared, np.array([np.eye(4), motion]), LikelihoodParameters())
+    v, u = keyframe.points.pixel
+    tile = label[v, u] == 1
+    # Where each point of the tile is then, and what is seen there: the tile, or the rim before it.
+    z = first.depth[v, u]
+    p_K = np.stack([(u - CAMERA.cx) / CAMERA.fx * z, (v - CAMERA.cy) / CAMERA.fy * z, z, np.ones(len(z))])
+    uv = np.rint(project((compared.X_C1K @ motion @ p_K)[:3].T, CAMERA)).astype(int)
+    behind = after[uv[:, 1], uv[:, 0]] == 2
+    assert 100 < (behind & tile).sum() < tile.sum() / 2
+    expected = np.bincount(keyframe.owner[behind & tile], minlength=keyframe.count) / np.maximum(
+        keyframe.point_count, 1
+    )
+    of_tile = np.unique(keyframe.owner[tile])
+    np.testing.assert_allclose(costs.covered[1, of_tile], expected[of_tile] * stood, atol=0.15)
+    assert costs.covered[1, of_tile].sum() == pytest.approx(expected.sum() * stood, rel=0.03)
 
 
 @pytest.mark.parametrize("another", [0.0, 0.3, 1.0])

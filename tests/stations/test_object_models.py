@@ -1,7 +1,10 @@
+import warnings
+
 import numpy as np
 import pytest
 import trimesh
 
+from riseg_drake.host.terminal import Notice
 from riseg_drake.stations.object_models import SceneError, find_model, find_models, with_remedy
 
 CUBE = "\n".join(
@@ -202,3 +205,19 @@ def test_one_model_is_found_by_its_file_or_as_the_only_one_of_its_folder(tmp_pat
         find_model(str(tmp_path / "brick"))
     with pytest.raises(SceneError, match="no file"):
         find_model(str(tmp_path / "gone.sdf"))
+
+
+def test_models_that_say_no_inertia_are_named_in_one_line(tmp_path):
+    box_model(tmp_path, "silent")
+    box_model(tmp_path, "other", inertial=INERTIA.format(m=0.2, i=1e-4))
+    with pytest.warns(Notice, match=r"^1 of 2 models say no moment of inertia \(silent\): SDF makes 1 kg m\^2"):
+        find_models(str(tmp_path))
+    for k in range(6):
+        box_model(tmp_path, f"s{k}")
+    with pytest.warns(Notice, match=r"^7 of 8 models .* \(s0, s1, s2, s3, s4, \.\.\.\)"):
+        find_models(str(tmp_path))
+    with pytest.warns(Notice, match=r"^1 of 1 models .* \(silent\)"):
+        find_model(str(tmp_path / "silent.sdf"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", Notice)
+        find_model(str(tmp_path / "other.sdf"))

@@ -44,6 +44,7 @@ WITHOUT: dict[str, Switch] = {
     "no memory of what left the view": {"segment.evidence.memory": False},
     "no keyframe seen again from nearby": {"segment.evidence.creep": 0.0},
     "in motion whole frames, not reduced": {"frame_pair.width": 0},
+    "what goes behind something counts as hidden": {"segment.evidence.observation.likelihood.covered": 1.0},
     "alike motions count at every push": {"segment.evidence.belief.once": False},
     "alike motions count, however little is shown": {"segment.evidence.observation.touching": -2.0},
 }

@@ -1,6 +1,7 @@
 """The work on one scene of an evaluation: all that one process does."""
 
 import os
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
@@ -28,7 +29,7 @@ from riseg_drake.app.scenario_file import parse_scenario
 from riseg_drake.evaluation.baselines import BASELINES
 from riseg_drake.evaluation.scene_result import SAM_METHODS
 from riseg_drake.evaluation.scores import Scores
-from riseg_drake.host.terminal import one_line
+from riseg_drake.host.terminal import Notice, one_line
 from riseg_drake.learned.sam import SamParameters
 from riseg_drake.recording.whole_file import write_text
 
@@ -52,7 +53,8 @@ def work_on(task: SceneTask) -> SceneOutcome:
     start = perf_counter()
     scenario = parse_scenario(task.scenario, Scenario, source=task.scenario_name)
     failure = ""
-    with limited_threads(task.threads):
+    with limited_threads(task.threads), warnings.catch_warnings():
+        warnings.simplefilter("ignore", Notice)  # told once, before all scenes
         for part in (_run, _score_others):
             try:
                 part(task, scenario)
