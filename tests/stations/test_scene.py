@@ -405,3 +405,21 @@ def test_where_there_is_room_for_the_fewest_alone_these_are_drawn(monkeypatch):
     assert len(draw_scene(config, np.random.default_rng(seed))) == 2
     # Each choice of objects is tried five times, two with nine, and then one fewer each time.
     assert drawn[::5] == [9, 9, 8, 7, 6, 5, 4, 3, 2]
+
+
+def test_objects_are_drawn_thirty_times_before_there_is_no_room_for_so_many(monkeypatch):
+    drawn = []
+
+    def the_last(shapes, gaps, habit, rng):
+        drawn.append(len(shapes))
+        return lay_out(shapes, gaps, habit, rng) if len(drawn) >= room else None
+
+    monkeypatch.setattr(scene_module, "lay_out", the_last)
+    config = SceneConfig(layout="spread", count_min=3, count_max=3)
+    room = 5 * 29 + 1
+    assert len(draw_scene(config, np.random.default_rng(1))) == 3
+    drawn.clear()
+    room = 5 * 30 + 1
+    with pytest.raises(SceneError, match=r"3 objects .* do not fit within"):
+        draw_scene(config, np.random.default_rng(1))
+    assert len(drawn) == 5 * 30
