@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.kernels.compiled import compiled
-from riseg_drake.kernels.reading import Real, between, nearest, projected
+from riseg_drake.kernels.reading import Real, between, nearest, placed, projected
 
 
 @compiled()
@@ -19,11 +19,10 @@ def _stood(
     back: NDArray[np.float32], u: Real, v: Real, z: Real, depth_0: NDArray[np.float32], near: Real
 ) -> bool:
     """Whether what is seen at (u, v) and depth z, m, was seen there before, within `near`, m."""
-    u, v, per_z = np.floor(u + np.float32(0.5)), np.floor(v + np.float32(0.5)), 1 / z
-    c = back[2, 0] * u + back[2, 1] * v + back[2, 2] + back[2, 3] * per_z
-    a = back[0, 0] * u + back[0, 1] * v + back[0, 2] + back[0, 3] * per_z
-    b = back[1, 0] * u + back[1, 1] * v + back[1, 2] + back[1, 3] * per_z
-    return bool(c > 0 and abs(nearest(depth_0, a / c, b / c) - c * z) < near)
+    place = np.floor(u + np.float32(0.5)), np.floor(v + np.float32(0.5))
+    u, v, c = placed(back, place[0], place[1], 1 / z)
+    apart = nearest(depth_0, u, v) - c * z
+    return bool(-near < apart < near)
 
 
 @compiled(

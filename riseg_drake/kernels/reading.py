@@ -31,10 +31,9 @@ def nearest(image: NDArray[np.float32], u: Real, v: Real) -> Real:
 
 
 @compiled()
-def projected(M: NDArray[np.float32], pixel: NDArray[np.float32], n: int) -> tuple[Real, Real, Real]:
-    """Where pixel n of `pixel` [4, N], (u, v, 1, 1 / z), is in another view by M [3, 4], `pixel_projection`:
+def placed(M: NDArray[np.float32], u: Real, v: Real, per_z: Real) -> tuple[Real, Real, Real]:
+    """Where what is seen at (u, v) and depth 1 / per_z is in another view by M [3, 4], `pixel_projection`:
     u, v, and by what factor its depth has grown; NaN for a point that is not ahead."""
-    u, v, per_z = pixel[0, n], pixel[1, n], pixel[3, n]
     c = M[2, 0] * u + M[2, 1] * v + M[2, 2] + M[2, 3] * per_z
     if not c > 0:
         nan = np.float32(np.nan)
@@ -42,3 +41,9 @@ def projected(M: NDArray[np.float32], pixel: NDArray[np.float32], n: int) -> tup
     a = M[0, 0] * u + M[0, 1] * v + M[0, 2] + M[0, 3] * per_z
     b = M[1, 0] * u + M[1, 1] * v + M[1, 2] + M[1, 3] * per_z
     return a / c, b / c, c
+
+
+@compiled()
+def projected(M: NDArray[np.float32], pixel: NDArray[np.float32], n: int) -> tuple[Real, Real, Real]:
+    """Where pixel n of `pixel` [4, N], (u, v, 1, 1 / z), is in another view, as `placed`."""
+    return placed(M, pixel[0, n], pixel[1, n], pixel[3, n])

@@ -25,12 +25,18 @@ def pixel_projection(X_C1C0: NDArray[np.float64], intrinsics: Intrinsics) -> NDA
     """
     k = intrinsics
     K = np.array([[k.fx, 0.0, k.cx], [0.0, k.fy, k.cy], [0.0, 0.0, 1.0]])
-    M = K @ X_C1C0[:3]
+    return of_pixels(K @ X_C1C0[:3], k).astype(np.float32)
+
+
+def of_pixels(rows: NDArray[np.float64], intrinsics: Intrinsics) -> NDArray[np.float64]:
+    """A linear map [k, 4] of points (x, y, z, 1) as one of their pixels (u, v, 1, 1 / z), whose values are
+    divided by z."""
+    k, M = intrinsics, rows.copy()
     # Its first three columns times K^-1, written out: this is asked for with every motion.
     M[:, 0] /= k.fx
     M[:, 1] /= k.fy
     M[:, 2] -= k.cx * M[:, 0] + k.cy * M[:, 1]
-    return M.astype(np.float32)
+    return M
 
 
 def expected_flow(

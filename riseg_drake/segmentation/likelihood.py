@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from riseg_drake.kernels.misfits import misfits
 from riseg_drake.segmentation.comparison import Comparison
-from riseg_drake.segmentation.expected_flow import pixel_projection
+from riseg_drake.segmentation.expected_flow import of_pixels, pixel_projection
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.scales import CORRELATED_DEPTH, CORRELATED_GRAY, OUTLIER
 
@@ -206,7 +206,6 @@ def _misfit(
 def _rises(keyframe: Keyframe, motion_K: NDArray[np.float64]) -> NDArray[np.float32]:
     """[4], of which the product with a point's (u, v, 1, 1 / z) is by how much a motion [4, 4] raises it above
     the table, divided by its depth z."""
-    k, plane_K = keyframe.frame.intrinsics, keyframe.above.plane_W @ keyframe.frame.X_WC
-    x, y, z, w = plane_K @ (motion_K - np.eye(4))
-    x, y = x / k.fx, y / k.fy
-    return np.array([x, y, z - k.cx * x - k.cy * y, w], np.float32)
+    plane_K = keyframe.above.plane_W @ keyframe.frame.X_WC
+    rises = plane_K @ (motion_K - np.eye(4))
+    return of_pixels(rises[None], keyframe.frame.intrinsics)[0].astype(np.float32)

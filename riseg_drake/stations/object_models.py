@@ -32,8 +32,6 @@ HEAVIEST = 20.0
 INERTIA_SHARE = 4.0
 """Of the largest moment of inertia that a body of an object's mass and collision shape can have: the shape may
 be simpler than the body."""
-
-
 _FEW = 5
 """Models that are named."""
 
