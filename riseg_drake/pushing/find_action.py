@@ -95,14 +95,19 @@ def find_action(
     for to_segment, scene, alone in stages:
         if not to_segment.any() or not (alone or parameters.validity.with_others):
             continue
+        turned: list[Push] = []  # beside the camera's view
         for clusters in find_clusters(to_segment, scene, parameters.clusters, rng, scene.doubtful):  # line 6
             pushes, failed = valid_pushes(clusters, replace(known, table=scene), tool, parameters, alone=alone)
-            push = search.best(pushes)
+            push = search.best([push for push in pushes if not push.turned])
             if push is not None:
                 return Decision(push, unsettled_area=area, doubtful_area=doubtful_area)  # lines 11, 12
+            turned += [push for push in pushes if push.turned]
             for criterion, which in failed.items():
                 fails[criterion] += int(np.count_nonzero(which))
             candidates += len(failed[Criterion.ACCESSIBLE])
+        push = search.best(turned)
+        if push is not None:
+            return Decision(push, unsettled_area=area, doubtful_area=doubtful_area)
     if search.failed:  # line 17
         return Decision(NO_PUSH, Ending.NO_PATH, area, doubtful_area, search.failed.total(), search.failed)
     return Decision(NO_PUSH, Ending.NOTHING_VALID, area, doubtful_area, candidates, +fails)

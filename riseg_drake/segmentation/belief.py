@@ -51,6 +51,11 @@ class Belief(Immutable):
     """[L, N], the same if all bonds were weaker."""
 
     @property
+    def divisions(self) -> NDArray[np.intp]:
+        """[1 + L, N], 0.., ways to tell which superpixels are one body, the likeliest first."""
+        return np.vstack([self.part[None], self.finer])
+
+    @property
     def bond(self) -> NDArray[np.float64]:
         """[M], log-odds that both sides of a border are one body."""
         return self.prior + self.evidence

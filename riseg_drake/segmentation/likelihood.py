@@ -152,15 +152,21 @@ def motion_costs(
     return Costs(misfit, keyframe.point_count.astype(float), lost, covered, compared.leaves)
 
 
-def unexplained_parts(nats: NDArray[np.float64], part: NDArray[np.intp]) -> NDArray[np.float64]:
-    """[P], nats by which the one motion that explains a part best falls short of the best of each superpixel.
+def nats_of_parts(nats: NDArray[np.float64], part: NDArray[np.intp]) -> NDArray[np.float64]:
+    """[G, P], how badly each of G motions explains all of each part.
 
     Args:
         nats: [G, N], how much worse than the best each motion explains each superpixel.
         part: [N], 0.., of each superpixel.
     """
     count = int(part.max(initial=-1)) + 1
-    return np.min([np.bincount(part, n, count) for n in nats], axis=0)
+    return np.array([np.bincount(part, n, count) for n in nats])
+
+
+def unexplained_parts(nats: NDArray[np.float64], part: NDArray[np.intp]) -> NDArray[np.float64]:
+    """[P], nats by which the one motion that explains a part best falls short of the best of each of its
+    superpixels; of what `nats_of_parts` takes."""
+    return np.asarray(nats_of_parts(nats, part).min(0))
 
 
 def _misfit(

@@ -21,7 +21,7 @@ from riseg_drake.geometry.rgbd import Immutable
 from riseg_drake.segmentation.alignment import AlignmentParameters, align_motions
 from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.keyframe import Keyframe
-from riseg_drake.segmentation.likelihood import LikelihoodParameters, motion_costs
+from riseg_drake.segmentation.likelihood import LikelihoodParameters, motion_costs, nats_of_parts
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.potts import PottsGraph, potts_labels
 
@@ -81,7 +81,7 @@ class Observation(Immutable):
 def observe(
     compared: Comparison,
     bond: NDArray[np.float64],
-    part: NDArray[np.intp],
+    divisions: NDArray[np.intp],
     shown: NDArray[np.float64],
     candidates_K: NDArray[np.float64],
     parameters: ObservationParameters,
@@ -91,7 +91,7 @@ def observe(
     Args:
         compared: the keyframe, which is explained, and the frame.
         bond: [M], log-odds of each border so far.
-        part: [N], 0.., which superpixels are one body so far.
+        divisions: [L, N], 0.., ways to tell which superpixels are one body, the likeliest first.
         shown: [M], of how many freedoms of a motion both sides of a border tell, see `coincidence`.
         candidates_K: [C, 4, 4], motions since the keyframe, seen from its camera.
         parameters: see there.
@@ -107,7 +107,7 @@ def observe(
     nats = costs.nats(parameters.likelihood)
     moves = _more_than_the_view_errs(compared, motions_K, nats, parameters.likelihood.view_errors)
     price = motion_price(compared, parameters)
-    among, motion = _fewest_motions(nats[moves], keyframe, bond, part, price, parameters)
+    among, motion = _fewest_motions(nats[moves], keyframe, bond, divisions, price, parameters)
     needed = np.flatnonzero(moves)[among]
     nats = costs.nats(parameters.likelihood, which=needed)
     share = np.bincount(motion, keyframe.area, len(needed)) / max(1, keyframe.area.sum())
@@ -138,8 +138,7 @@ def evidence_of_parts(
 
     A superpixel of a blank thing says little of its motion, all of them together may be sure of it.
     """
-    nats = np.array([np.bincount(part, n) for n in seen.nats])
-    q = motion_posterior(nats, seen.share, parameters.outlier)
+    q = motion_posterior(nats_of_parts(seen.nats, part), seen.share, parameters.outlier)
     return _evidence(keyframe, q[:, part], seen.share, shown, parameters)
 
 
@@ -219,28 +218,35 @@ def _fewest_motions(
     nats: NDArray[np.float64],
     keyframe: Keyframe,
     bond: NDArray[np.float64],
-    part: NDArray[np.intp],
+    divisions: NDArray[np.intp],
     price: float,
     parameters: ObservationParameters,
 ) -> tuple[list[int], NDArray[np.intp]]:
-    """The motions that are needed, and which of these each superpixel [N] has; drops the others one by one."""
+    """The motions that are needed, and which of these each superpixel [N] has; drops the others one by one.
+
+    To be needed takes what it takes to be found (`Search`): superpixels that it explains, or a part of any of
+    the divisions [L, N] that no other motion explains.
+    """
     coupling = parameters.border * np.maximum(bond, parameters.border_least) * keyframe.length
     graph = PottsGraph(keyframe.count, keyframe.borders, coupling)
     needed, message = list(range(len(nats))), None
-    nats_of_parts = np.array([np.bincount(part, n) for n in nats])
+    part = divisions[0]
+    nats_of_all = np.hstack([nats_of_parts(nats, division) for division in divisions])
     while True:
         unary = nats[needed].astype(np.float32)
         unary[1:] += np.float32(parameters.still)
         motion, message = potts_labels(unary, graph, message)
-        gains, of_parts = [], nats_of_parts[needed]
+        # Two other motions may each explain half of a part, and none all of it.
+        of_parts = nats_of_all[needed]
+        without_best = np.diff(np.partition(of_parts, min(1, len(needed) - 1), axis=0)[:2], axis=0)
+        as_parts = [without_best[:, of_parts.argmin(0) == k].max(initial=0) for k in range(len(needed))]
+        gains = []
         for k in range(1, len(needed)):
             mine = nats[np.ix_(needed, motion == k)]
             # All of a part, as far as it has this motion, would have another one.
             without, owner = np.delete(mine, k, axis=0) - mine[k], part[motion == k]
             as_labelled = np.min([np.bincount(owner, w) for w in without], axis=0).sum()
-            # Two other motions may each explain half of a part, and none all of it.
-            as_parts = (np.delete(of_parts, k, axis=0).min(0) - of_parts.min(0)).sum()
-            gains.append(float(max(as_labelled, as_parts)))
+            gains.append(float(max(as_labelled, as_parts[k])))
         if not gains or min(gains) >= price:
             return needed, motion
         dropped = int(np.argmin(gains)) + 1

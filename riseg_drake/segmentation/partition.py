@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.segmentation.keyframe import Keyframe
+from riseg_drake.segmentation.likelihood import nats_of_parts
 from riseg_drake.segmentation.multicut import multicut
 from riseg_drake.segmentation.potts import PottsGraph, potts_labels
 from riseg_drake.segmentation.scales import SMALLEST_OBJECT
@@ -115,7 +116,7 @@ def apart(
 ) -> NDArray[np.float64]:
     """[M], log-odds of each border that speak against it since its two parts [N] have no one motion."""
     a, b = part[keyframe.borders].T
-    cost = _nats_of_parts(part, nats)
+    cost = nats_of_parts(nats, part)
     # What it costs both parts to have one motion.
     shared = (cost[:, a] + cost[:, b]).min(0) - cost[:, a].min(0) - cost[:, b].min(0)
     lost = shared - parameters.rigid_min
@@ -135,15 +136,9 @@ def motions_of_parts(
         nats: [G, N], how badly each motion explains each superpixel; the first is standing still.
         parameters: see there.
     """
-    worse = _nats_of_parts(part, nats)
+    worse = nats_of_parts(nats, part)
     worse[1:] += parameters.moved_min
     return worse.argmin(0)
-
-
-def _nats_of_parts(part: NDArray[np.intp], nats: NDArray[np.float64]) -> NDArray[np.float64]:
-    """[G, P], how badly each motion explains all of each part."""
-    count = int(part.max(initial=-1)) + 1
-    return np.array([np.bincount(part, n, count) for n in nats])
 
 
 def with_ids(

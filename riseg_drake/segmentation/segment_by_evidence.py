@@ -172,7 +172,7 @@ def _explained(
 ) -> tuple[Observation, Bodies]:
     """What a frame says, given some motions [C, 4, 4] as the camera that it is compared with sees them, and the
     bodies by it."""
-    seen = observe(compared, belief.bond, belief.part, belief.shown, candidates_N, parameters.observation)
+    seen = observe(compared, belief.bond, belief.divisions, belief.shown, candidates_N, parameters.observation)
     X_KN = inverse(belief.keyframe.frame.X_WC) @ compared.keyframe.frame.X_WC
     seen = replace(seen, motions_K=seen_from(X_KN, seen.motions_K))
     return bodies_of(belief, seen, before, parameters.belief, parameters.observation)
@@ -183,7 +183,7 @@ def _problem(belief: Belief, compared: Comparison, look: Look) -> SearchProblem:
     return SearchProblem(
         compared,
         look.above if compared.frame is look.frame else look.whole_above,
-        np.vstack([belief.part[None], belief.finer]),
+        belief.divisions,
         motion_price(compared, parameters.observation),
         parameters.search,
         parameters.observation.likelihood,

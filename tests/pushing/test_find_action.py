@@ -208,6 +208,18 @@ def test_the_back_of_the_tool_pushes_where_the_arm_cannot_with_its_front_and_onl
     assert ahead.yaw == pytest.approx(np.arctan2(*ahead.direction_W[::-1]))
 
 
+def test_half_of_a_thing_pushed_in_view_comes_before_all_of_it_pushed_beside_the_view(drawn):
+    table = drawn.disc(0.5, 0.0, 0.03).map()
+
+    def plan_path(push):
+        halved = np.linalg.norm(push.center_W - [0.5, 0.0]) > 0.005
+        return (np.zeros(7), "a path") if push.turned or halved else PathStage.POSTURE
+
+    push = decide(table, plan_path=plan_path, parameters=FindActionParameters(paths=100)).push
+    assert not push.turned
+    assert np.linalg.norm(push.center_W - [0.5, 0.0]) > 0.005
+
+
 @pytest.mark.parametrize(("reaches", "turned"), [((-0.02, 0.09), [True]), ((-0.09, 0.02), [False])])
 def test_what_reaches_over_one_side_of_the_tip_may_be_kept_away_from_a_tall_thing(new_table, reaches, turned):
     """A low box before a wall: what is 30 mm above the tip has no room on that side."""

@@ -216,7 +216,7 @@ def test_boxes_get_their_motions_and_borders_inside_them_hold():
     keyframe = moved.belief.keyframe
     belief = moved.belief
     seen = observe(
-        moved.compared, belief.bond, belief.part, belief.shown, moved.search(), ObservationParameters()
+        moved.compared, belief.bond, belief.divisions, belief.shown, moved.search(), ObservationParameters()
     )
     truth = np.array(
         [
