@@ -88,6 +88,12 @@ class Frame(Immutable):
         """Depth [H, W], m, with 0 (invalid) where the robot is in the way."""
         return np.where(self.robot, np.float32(0), self.depth)
 
+    @cached_property
+    def typical_depth(self) -> float:
+        """Median of every so many-th pixel's depth, m; 1 where there is none."""
+        some = self.depth[:: max(1, self.depth.shape[0] // 24), :: max(1, self.depth.shape[1] // 24)]
+        return float(np.median(some[some > 0])) if (some > 0).any() else 1.0
+
 
 NO_FRAME = Frame(
     sequence=-1,

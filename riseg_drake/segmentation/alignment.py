@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import Intrinsics, rays
 from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
-from riseg_drake.geometry.se3 import exp_se3, move_points, translation
+from riseg_drake.geometry.se3 import move_points
 from riseg_drake.kernels.normal_equations import normal_equations
+from riseg_drake.kernels.screw import screwed
 from riseg_drake.segmentation.expected_flow import pixel_projection
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.noise import MeasurementNoise, depth_sigma
@@ -179,15 +180,13 @@ class RigidFit:
         """One motion [4, 4] fitted to its own pixels."""
         centre = move_points(motion, edges.p_C0Q.mean(0)[None])[0]
         precision = np.repeat([parameters.turn**-2.0, parameters.shift**-2.0], 3)
-        V, X = np.zeros(6), motion
+        V, X = np.zeros(6), np.ascontiguousarray(motion)
         for _ in range(rounds):
-            normal, rhs = np.diag(precision), -precision * V
-            of_pixels, rhs_of_pixels = self._normal_equations(edges, X, centre, parameters.outlier)
-            normal += of_pixels
-            rhs += rhs_of_pixels
-            step = np.linalg.solve(normal, rhs)
+            normal, rhs = self._normal_equations(edges, X, centre, parameters.outlier)
+            normal[np.diag_indices(6)] += precision
+            step = np.linalg.solve(normal, rhs - precision * V)
             V = V + step
-            X = translation(centre) @ exp_se3(step) @ translation(-centre) @ X
+            X = screwed(step, centre, X)
         return X
 
     def _normal_equations(
@@ -202,7 +201,7 @@ class RigidFit:
             edges.variance,
             edges.alike,
             pixel_projection(self.X_C1C0 @ X, k),
-            np.ascontiguousarray(X),
+            X,
             self.X_C1C0,
             centre,
             (k.fx, k.fy),

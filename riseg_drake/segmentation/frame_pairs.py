@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from riseg_drake.geometry.rgbd import NO_PAIR, Frame, FramePair
-from riseg_drake.geometry.se3 import log_se3
 
 _SAME_TIME = 1e-3
 """s; stamps are rounded."""
@@ -70,8 +69,7 @@ def next_pair(pair: FramePair, frame: Frame, flow_span: float, parameters: Frame
 
 def camera_span(reference: Frame, current: Frame) -> float:
     """About how many pixels the camera's motion shifts the image between two frames."""
-    V = log_se3(FramePair(reference, current).X_C1C0)
-    depth = current.depth[:: current.depth.shape[0] // 24 or 1, :: current.depth.shape[1] // 24 or 1]
-    z = float(np.median(depth[depth > 0])) if (depth > 0).any() else 1.0
-    focal_length = current.intrinsics.fx
-    return focal_length * float(np.linalg.norm(V[3:]) / z + np.linalg.norm(V[:3]))
+    apart = current.X_WC[:3] - reference.X_WC[:3]
+    # The chord of a turn is as long in any frame.
+    turn = 2 * np.arcsin(min(1.0, float(np.linalg.norm(apart[:, :3])) / np.sqrt(8)))
+    return current.intrinsics.fx * float(np.linalg.norm(apart[:, 3]) / current.typical_depth + turn)

@@ -88,10 +88,11 @@ class SearchProblem:
 
     def possible_bodies(self) -> NDArray[np.bool_]:
         """[B, N], the parts of all divisions that are as large as a body, each once."""
-        area = self.compared.keyframe.area
-        parts = [part == p for part in self.divisions for p in range(int(part.max(initial=-1)) + 1)]
-        large = [part for part in parts if area[part].sum() >= self.pixels_min]
-        return np.unique(np.array(large).reshape(-1, len(area)), axis=0)
+        area, each = self.compared.keyframe.area, {}
+        for part in self.divisions:
+            for p in np.flatnonzero(np.bincount(part, area) >= self.pixels_min):
+                each[(part == p).tobytes()] = part == p
+        return np.array([each[key] for key in sorted(each)], bool).reshape(-1, len(area))
 
     @property
     def pixels_min(self) -> float:

@@ -16,7 +16,9 @@ from riseg_drake.geometry.camera import Intrinsics, bounding_region, project
 from riseg_drake.geometry.nearest import nearest_places
 from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.geometry.se3 import inverse
+from riseg_drake.kernels.drawing import drawn_labels
 from riseg_drake.segmentation.above_table import AboveTable
+from riseg_drake.segmentation.expected_flow import pixel_projection
 from riseg_drake.segmentation.surface import SurfacePixels, seek, surface_pixels
 
 UNKNOWN = np.uint16(65535)
@@ -36,9 +38,6 @@ _CLOSE = 5
 
 _BEHIND = 0.03
 """Share of its depth by which what shows through such a gap lies behind."""
-
-_STEPS = 65535
-"""Of nearness, 1 / depth, that are told apart: 16 bits."""
 
 
 def carry_labels(
@@ -93,24 +92,11 @@ def draw_labels(
     """
     X_C1C0 = inverse(current.X_WC) @ reference.X_WC
     surface = surface_pixels(label_0 > 0, reference.depth, reference.intrinsics)
-    owner = label_0.ravel().take(surface.index)
-    shape = current.intrinsics.shape
-    places, per_depths, labels = [], [], []
-    for moves, motion in _by_motion(motion_of):
-        own = np.flatnonzero(moves.take(owner))
-        sought = seek(surface.subset(own), X_C1C0 @ motion)
-        inside = np.flatnonzero(sought.inside(shape))
-        v, u = (np.rint(x.ravel().take(inside)).astype(np.intp) for x in (sought.v, sought.u))
-        places.append(v * shape[1] + u)
-        per_depths.append(1 / sought.depth.take(inside))
-        labels.append(owner.take(own.take(inside)))
-    place, per_depth, label = (np.concatenate(each) for each in (places, per_depths, labels))
-    # What is nearest is drawn last; in steps of nearness, as few as are sorted quickly.
-    steps = (per_depth * (_STEPS / max(float(per_depth.max(initial=0)), 1e-9))).astype(np.uint16)
-    order = np.argsort(steps, kind="stable")
-    place, per_depth, label = place.take(order), per_depth.take(order), label.take(order)
-    spots, drawn = np.zeros(shape, np.float32), np.zeros(shape, np.uint16)
-    spots.ravel()[place], drawn.ravel()[place] = per_depth, label
+    label = label_0.ravel().take(surface.index)
+    groups = _by_motion(motion_of)
+    group = np.argmax([moves.take(label) for moves, _ in groups], axis=0)
+    M = np.array([pixel_projection(X_C1C0 @ motion, reference.intrinsics) for _, motion in groups])
+    drawn, spots = drawn_labels(surface.homogeneous, label, group, M, current.intrinsics.shape)
     # Nearer than it was, a thing is larger: its points leave gaps, through which others show.
     closed = cv2.morphologyEx(spots, cv2.MORPH_CLOSE, np.ones((_CLOSE, _CLOSE), np.uint8))
     drawn[closed > (1 + _BEHIND) * spots] = 0

@@ -94,9 +94,9 @@ def test_the_new_reference_is_the_frame_before_the_newest() -> None:
 @pytest.mark.parametrize("shift", [0.01, 0.05])
 def test_the_cameras_span_is_that_of_its_shift_or_of_its_turn(shift: float) -> None:
     there = camera_span(frame(0), frame(1, looking_down(x=shift)))
-    assert there == pytest.approx(CAMERA.fx * shift / DEPTH, rel=0.02)
+    assert there == pytest.approx(CAMERA.fx * shift / DEPTH, rel=1e-6)
     turned = camera_span(frame(0), frame(1, looking_down(tilt=shift)))
-    assert turned == pytest.approx(CAMERA.fx * shift, rel=0.02)
+    assert turned == pytest.approx(CAMERA.fx * shift, rel=1e-6)
     assert camera_span(frame(0), frame(1)) == pytest.approx(0, abs=1e-9)
 
 
