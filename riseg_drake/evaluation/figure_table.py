@@ -53,5 +53,5 @@ def percent(share: float) -> str:
 
 
 def number(value: float, digits: int) -> str:
-    """A number with so many digits after its point, or a dash for what is unknown."""
+    """A number (percent, m or degrees) with so many digits after its point, or a dash for what is unknown."""
     return "–" if isnan(value) else f"{value:.{digits}f}"
