@@ -85,10 +85,7 @@ def test_the_objects_that_were_found_are_labelled_at_its_end(page, found):
 
 def test_at_its_end_the_labels_say_what_was_decided_last_and_no_push_is_left(page, seen):
     page.ask("viewer.animator.pause()")
-    if page.ask("location.protocol === 'http:'"):
-        page.ask("viewer.animator.seek(viewer.animator.duration)")
-    else:  # as far as a person can push the slider
-        page.ask("(s => { s.value = s.max; s.oninput(); })(document.querySelector('#riseg-track input'))")
+    page.ask("viewer.animator.seek(viewer.animator.duration)")
     shown = page.ask(f"({SHOWN})()")
     confidence = json.loads((seen[1] / "summary.json").read_text())["steps"][-1]["confidence"]
     expected = {object_id: f"{100 * sure:.0f}_%" for object_id, sure in confidence.items()}

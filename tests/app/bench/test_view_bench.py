@@ -44,7 +44,7 @@ def test_every_frame_is_timed_without_and_with_a_view_that_draws(small_scenario,
     assert (times > 0).all()
     assert moments == ["without", "with"] + 4 * ["with", "without", "without", "with"]
     assert meshcat.HasPath("/riseg/panel")
-    assert meshcat.HasPath("/visualizer")
+    assert meshcat.HasPath("/drake/visualizer")
 
 
 @pytest.mark.renders
