@@ -303,7 +303,7 @@ def command_line() -> argparse.ArgumentParser:
         subparsers,
         "pictures",
         commands.pictures,
-        "Make the pictures of the documentation anew: one run as a GIF and as a strip, the wired diagrams.\n"
+        "Make the pictures of the documentation anew: one run as a film and as a strip, the wired diagrams.\n"
         "With --evaluation also the figure of an evaluation.",
     )
     add_scenario(pictures)

@@ -149,7 +149,9 @@ def bench(chosen: argparse.Namespace, console: Console) -> None:
         return bench_run(chosen.scenario, chosen.seed, chosen.json, console)
     from riseg_drake.app.bench.command import bench_command
 
-    bench_command(chosen.scenario, chosen.seed, chosen.stream, chosen.sam, chosen.json, console)
+    bench_command(
+        chosen.scenario, chosen.seed, chosen.stream, chosen.sam, chosen.json, console, view=chosen.view
+    )
 
 
 def doctor(chosen: argparse.Namespace, console: Console) -> int:

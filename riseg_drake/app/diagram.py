@@ -68,6 +68,7 @@ class WiredDiagram:
         stages: list[LeafSystem],
         scenario: Scenario,
         refiner: MaskRefiner | None = None,
+        view: MeshcatView | None = None,
     ):
         self.diagram = diagram
         self.stages = stages
@@ -79,7 +80,7 @@ class WiredDiagram:
         """By object id, as in the ground truth; empty where nobody knows it."""
         self.object_axes = {placed.name: placed.model.axes for placed in objects}
         """By name, the unit vectors in B [k, 3] about which an object is a body of revolution."""
-        self._refiner = refiner
+        self._refiner, self._view = refiner, view
         self._object_bodies = station.object_bodies if simulated else {}
         self._centres = {i: RigidTransform(placed.model.centre) for i, placed in enumerate(objects, start=1)}
         self._ports: dict[str, OutputPort] = {}
@@ -123,6 +124,11 @@ class WiredDiagram:
         if self._refiner is None:
             return []
         return self._refiner.finish(self._refiner.GetMyContextFromRoot(context))
+
+    def show_end(self, context: Context) -> None:
+        """Let who looks on in the browser see how it ended."""
+        if self._view is not None:
+            self._view.show_end(context)
 
     def phase(self, context: Context) -> ArmPhase:
         """What the arm is doing."""
@@ -217,9 +223,10 @@ def make_diagram(
     builder.Connect(station.GetOutputPort("panda.position_measured"), arm.GetInputPort("position_measured"))
     builder.Connect(arm.GetOutputPort("position"), station.GetInputPort("panda.position"))
     refiner = add_refinement(builder, scenario, segmentation, arm)
+    view: MeshcatView | None = None
     if meshcat is not None:
         view = builder.AddSystem(
-            MeshcatView(meshcat, 1 / config.camera.rate, _stage(scenario, kinematics.tool))
+            MeshcatView(meshcat, 1 / config.camera.rate, stage_of(scenario, kinematics.tool))
         )
         for name in ("pair", "segmentation"):
             builder.Connect(segmentation.outputs[name], view.GetInputPort(name))
@@ -237,10 +244,10 @@ def make_diagram(
         builder.ExportOutput(refiner.GetOutputPort("refined"), "refined")
     diagram = builder.Build()
     diagram.set_name("rt-RISeg")
-    return WiredDiagram(diagram, station, [*segmentation.stages, planner, arm], scenario, refiner)
+    return WiredDiagram(diagram, station, [*segmentation.stages, planner, arm], scenario, refiner, view)
 
 
-def _stage(scenario: Scenario, tool: ToolShape) -> Stage:
+def stage_of(scenario: Scenario, tool: ToolShape) -> Stage:
     """What stands around the view; a simulation draws its table and things itself."""
     config = scenario.station
     if not isinstance(config, SimulatedStationConfig):

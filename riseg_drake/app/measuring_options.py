@@ -49,6 +49,9 @@ def add_bench_options(command: argparse.ArgumentParser) -> None:
         help="measure instead how evenly commands for a real arm are sent beside the segmentation",
     )
     instead.add_argument(
+        "--view", action="store_true", help="measure instead what the live view in the browser costs"
+    )
+    instead.add_argument(
         "--stops", action="store_true", help="measure instead how soon a moving arm stands still, over LCM"
     )
     instead.add_argument(

@@ -52,6 +52,8 @@ PICTURE_RATE = 2.0
 """How often the picture is renewed, 1/s."""
 PICTURE_WIDTH = 400
 """Of the panel's picture, pixels."""
+SMALL, DIFFERENT = (80, 60), 8
+"""Two pictures of which no pixel differs by so many gray levels, shrunk to that size, look alike."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +123,30 @@ def points_of(frame: Frame, mask: NDArray) -> Points:
     return Points(p_CQ @ frame.X_WC[:3, :3].T + frame.X_WC[:3, 3], ids[seen], tinted[seen].astype(np.uint8))
 
 
+@dataclass(frozen=True, eq=False)
+class _Sight:
+    """What a person would see a difference in."""
+
+    small: NDArray[np.uint8]
+    """The camera's picture, so small that its noise is gone."""
+    mask: NDArray
+    words: tuple[str, ...]
+
+    @classmethod
+    def of(cls, frame: Frame, segmentation: Segmentation, caption: str) -> "_Sight":
+        small = cv2.resize(frame.color, SMALL, interpolation=cv2.INTER_AREA)
+        return cls(small.astype(np.uint8), segmentation.mask, (caption, *label_texts(segmentation).values()))
+
+    def looks_like(self, other: "_Sight | None") -> bool:
+        """Whether it need not be drawn again."""
+        return (
+            other is not None
+            and self.words == other.words
+            and np.array_equal(self.mask, other.mask)
+            and int(cv2.absdiff(self.small, other.small).max()) < DIFFERENT
+        )
+
+
 class MeshcatView(LeafSystem):
     """Draws the camera's picture with its masks, the points of the objects, their labels, and the push.
 
@@ -137,6 +163,8 @@ class MeshcatView(LeafSystem):
         self._drawn: set[str] = set()  # the labels that there are, shown or not
         self._labelled: set[int] = set()  # ids that have, or had, a label
         self._sequence = -1
+        self._sight: _Sight | None = None
+        self._number = 0  # of the pictures that were shown
         self._push = NO_PUSH
         self._is_open = False
         for name, model in (
@@ -162,19 +190,44 @@ class MeshcatView(LeafSystem):
             self._open(time)
         # At a tick both are of the frame before; a pair without its mask yet is left for the next tick.
         if self._sequence != pair.current.sequence == segmentation.sequence:
-            self._sequence = segmentation.sequence
             caption = caption_of(step if phase is ArmPhase.OBSERVE else step + 1, phase, segmentation)
-            self._show_panel(pair.current, segmentation, caption, time)
-            points = points_of(pair.current, segmentation.mask)
-            self._show_points(pair.current.sequence, points, time)
-            self._show_labels(points, segmentation, time)
+            sight = _Sight.of(pair.current, segmentation, caption)
+            # While somebody is asked whether to push, say, a replay need not grow.
+            if not sight.looks_like(self._sight):
+                self._show(pair.current, segmentation, caption, time)
+                self._sight = sight
+            self._sequence = segmentation.sequence
+        self._show_push(push, step, time)
+        return EventStatus.Succeeded()
+
+    def show_end(self, context: Context) -> None:
+        """Show what was decided last, and that nothing more comes; of the whole diagram's context."""
+        mine = self.GetMyContextFromRoot(context)
+        pair: FramePair = self.GetInputPort("pair").Eval(mine)
+        segmentation: Segmentation = self.GetInputPort("segmentation").Eval(mine)
+        step: int = self.GetInputPort("interaction_step").Eval(mine)
+        if pair is NO_PAIR or pair.current.sequence != segmentation.sequence:
+            return
+        time = context.get_time()
+        if not self._is_open:
+            self._open(time)
+        self._show(pair.current, segmentation, ending_of(step, segmentation), time)
+        self._show_push(NO_PUSH, step, time)
+
+    def _show(self, frame: Frame, segmentation: Segmentation, caption: str, time: float) -> None:
+        self._number += 1
+        self._show_panel(frame, segmentation, caption, time)
+        points = points_of(frame, segmentation.mask)
+        self._show_points(points, time)
+        self._show_labels(points, segmentation, time)
+
+    def _show_push(self, push: Push, step: int, time: float) -> None:
         if push is not self._push:
             self._push = push
             path = f"/riseg/push/step_{step}" if push is not NO_PUSH else ""
             if push is not NO_PUSH:
                 draw_push(self._meshcat, path, push, self._stage.tool)
             self._turn_to("push", path, time)
-        return EventStatus.Succeeded()
 
     def _open(self, time: float) -> None:
         self._is_open = True
@@ -182,13 +235,13 @@ class MeshcatView(LeafSystem):
         open_stage(self._meshcat, self._stage.centre_W)
 
     def _show_panel(self, frame: Frame, segmentation: Segmentation, caption: str, time: float) -> None:
-        path = f"/riseg/panel/{frame.sequence}"
+        path = f"/riseg/panel/{self._number}"
         set_card(self._meshcat, path, panel_picture(frame, segmentation, caption), PANEL_WIDTH)
         self._meshcat.SetTransform(path, facing(on_stage(self._stage.centre_W, PANEL)))
         self._turn_to("panel", path, time)
 
-    def _show_points(self, sequence: int, points: Points, time: float) -> None:
-        path = f"/riseg/points/{sequence}"
+    def _show_points(self, points: Points, time: float) -> None:
+        path = f"/riseg/points/{self._number}"
         if self._stage.has_things:
             points = points.of_objects
         self._meshcat.SetObject(path, points.cloud(POINT_LIFT), POINT_SIZE)
@@ -227,6 +280,15 @@ def caption_of(interaction: int, phase: ArmPhase, segmentation: Segmentation) ->
     """Where the run is, in one line."""
     number = len(segmentation.object_ids)
     return f"interaction {interaction}, {phase.value}: {number} {'object' if number == 1 else 'objects'} found"
+
+
+def ending_of(interactions: int, segmentation: Segmentation) -> str:
+    """That a run is over, in one line."""
+    number = len(segmentation.object_ids)
+    return (
+        f"ended after {interactions} interaction{'' if interactions == 1 else 's'}: "
+        f"{number} {'object' if number == 1 else 'objects'} found"
+    )
 
 
 def label_texts(segmentation: Segmentation) -> dict[int, str]:

@@ -2,20 +2,16 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from riseg_drake.evaluation.ablation_report import ablation_section
 from riseg_drake.evaluation.disturbance import DisturbanceFigures, disturbance_of_all
+from riseg_drake.evaluation.figure_table import FigureTable, markdown_table, percent
 from riseg_drake.evaluation.in_motion import MOVED, InMotion, mean_over_scenes
-from riseg_drake.evaluation.report import (
-    DISTURBANCE_HEAD,
-    ablation_section,
-    disturbance_cells,
-    markdown_table,
-    percent,
-)
+from riseg_drake.evaluation.report import DISTURBANCE_HEAD, disturbance_cells
 from riseg_drake.evaluation.scene_result import SceneResult
 from riseg_drake.evaluation.scores import Scores
 from riseg_drake.evaluation.step_means import step_means
@@ -59,14 +55,6 @@ class KindResult:
         return dict(Counter(reasons).most_common())
 
 
-@dataclass(frozen=True)
-class FigureTable:
-    """Figures in words, of each kind or of each scene."""
-
-    head: Sequence[str]
-    rows: Sequence[Sequence[str]]
-
-
 def suite_text(kinds: Sequence[KindResult], about: Mapping[str, object]) -> str:
     """The whole report; `about` are its settings, by name."""
 
@@ -80,7 +68,7 @@ def suite_text(kinds: Sequence[KindResult], about: Mapping[str, object]) -> str:
         for scene in kind.scenes
     ]
     moved = moved_table(kinds)
-    ablation = ablation_section([s for kind in kinds for s in kind.scenes], max(k.last_step for k in kinds))
+    ablation = ablation_section(*of_all_kinds(kinds))
     return "\n".join(
         [
             "# A suite of scenes\n",
@@ -97,6 +85,12 @@ def suite_text(kinds: Sequence[KindResult], about: Mapping[str, object]) -> str:
             linked(scenes_table(kinds), pictures),
         ]
     )
+
+
+def of_all_kinds(kinds: Sequence[KindResult]) -> tuple[list[SceneResult], int]:
+    """Every scene, its kind before its name, and the most interactions that any of them may have."""
+    scenes = [replace(scene, name=f"{kind.name}, {scene.name}") for kind in kinds for scene in kind.scenes]
+    return scenes, max(kind.last_step for kind in kinds)
 
 
 def kinds_table(kinds: Sequence[KindResult]) -> FigureTable:

@@ -1,5 +1,6 @@
 """The live page and the replay as a browser has them."""
 
+import json
 import re
 
 import cv2
@@ -80,6 +81,17 @@ def test_the_objects_that_were_found_are_labelled_at_its_end(page, found):
     assert len([path for path in shown if path.startswith("/riseg/panel/")]) == 1
     labels = [match[1] for path in shown if (match := re.match(r"/riseg/labels/(\d+)/", path))]
     assert labels == [str(object_id) for object_id in found]
+
+
+def test_at_its_end_the_labels_say_what_was_decided_last_and_no_push_is_left(page, seen):
+    page.ask("viewer.animator.pause()")
+    page.ask("viewer.animator.seek(viewer.animator.duration)")
+    shown = page.ask(f"({SHOWN})()")
+    confidence = json.loads((seen[1] / "summary.json").read_text())["steps"][-1]["confidence"]
+    expected = {object_id: f"{100 * sure:.0f}_%" for object_id, sure in confidence.items()}
+    labels = [match for path in shown if (match := re.match(r"/riseg/labels/(\d+)/(\d+)__(\d+_%)", path))]
+    assert {match[1]: match[3] for match in labels} == expected
+    assert not [path for path in shown if path.startswith("/riseg/push/")]
 
 
 def test_it_opens_in_front_of_the_robot_and_above_the_table(page):

@@ -1,4 +1,5 @@
 import io
+import re
 from types import SimpleNamespace
 
 import pytest
@@ -21,6 +22,11 @@ def test_the_slider_stands_at_the_end_of_the_page_with_its_marks():
     assert page.startswith("<script>'</body>'</script><p></p><style>")
     assert page.endswith("</body></html>")
     assert 'const marks = [["1", 2.5], ["2", 9.0]];' in page
+
+
+def test_the_slider_reaches_the_end_whatever_the_last_digits_of_its_time():
+    (slider,) = re.findall(r'<input type="range"[^>]*>', with_marks("<body></body>", {}))
+    assert 'step="any"' in slider
 
 
 def interrupted(meshcat, file):

@@ -1,14 +1,28 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydrake.geometry import Meshcat
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
 
 from riseg_drake.app.meshcat_stage import EYE, PANEL, TARGET, facing, on_stage
-from riseg_drake.app.meshcat_view import GAMMA, caption_of, label_texts, panel_picture, points_of
+from riseg_drake.app.meshcat_view import (
+    GAMMA,
+    MeshcatView,
+    Stage,
+    caption_of,
+    ending_of,
+    label_texts,
+    panel_picture,
+    points_of,
+)
 from riseg_drake.geometry.camera import Intrinsics, back_project
-from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.pictures.cards import set_card, with_caption
 from riseg_drake.pictures.object_colors import object_colors
 from riseg_drake.pushing.arm_path import ArmPhase
+from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.segmentation.segmentation import Segmentation
 
 INTRINSICS = Intrinsics(30, 30, 30.0, 30.0, 15.0, 15.0)
@@ -95,6 +109,53 @@ def test_the_panel_has_the_cameras_picture_above_a_line_of_text():
     assert picture.shape == (300 + 50, 400, 3)
     assert (picture[:300] == 0).all()
     assert picture[300:].max() > 200
+
+
+def panels(frames, meshcat):
+    """How many pictures were shown once these were seen, by their gray level and the object's id: a tick each;
+    the view, and the context of the diagram around it."""
+    view = MeshcatView(meshcat, 0.5, Stage((0.5, 0.0), tool=None))
+    builder = DiagramBuilder()
+    builder.AddSystem(view)
+    for name in ("pair", "segmentation", "active_push", "interaction_step", "phase"):
+        builder.ExportInput(view.GetInputPort(name), name)
+    diagram = builder.Build()
+    simulator = Simulator(diagram)
+    context = simulator.get_mutable_context()
+    for name, value in (("active_push", NO_PUSH), ("interaction_step", 2), ("phase", ArmPhase.OBSERVE)):
+        diagram.GetInputPort(name).FixValue(context, value)
+    for tick, (gray, object_id) in enumerate(frames):
+        seen = replace(frame(), sequence=tick, color=np.full((30, 30, 3), gray, np.uint8))
+        diagram.GetInputPort("pair").FixValue(context, FramePair(seen, seen))
+        diagram.GetInputPort("segmentation").FixValue(context, Segmentation(tick, mask_of(object_id)))
+        simulator.AdvanceTo(0.5 * tick + 0.1)
+    number = 0
+    while meshcat.HasPath(f"/riseg/panel/{number + 1}"):
+        number += 1
+    return number, view, context
+
+
+@pytest.mark.parametrize(
+    ("frames", "shown"),
+    [
+        ([(90, 4)], 1),
+        ([(90, 4), (92, 4), (90, 4)], 1),  # noise, and nothing else
+        ([(90, 4), (120, 4), (120, 4)], 2),
+        ([(90, 4), (90, 5)], 2),
+        ([(90, 4), (96, 4), (102, 4)], 2),  # a little at a time is as much in the end
+    ],
+)
+def test_a_picture_is_shown_anew_only_where_a_person_would_see_a_difference(frames, shown):
+    assert panels(frames, Meshcat())[0] == shown
+
+
+def test_the_end_is_shown_whatever_was_shown_before():
+    meshcat = Meshcat()
+    number, view, context = panels([(90, 4)], meshcat)
+    view.show_end(context)
+    assert number == 1
+    assert meshcat.HasPath("/riseg/panel/2")
+    assert ending_of(2, Segmentation(0, mask_of(4))) == "ended after 2 interactions: 1 object found"
 
 
 def test_a_card_faces_who_looks_from_the_front_and_stands_upright():

@@ -5,17 +5,10 @@ import pytest
 
 from riseg_drake.evaluation.disturbance import Disturbance, DisturbanceFigures, ObjectMotion
 from riseg_drake.evaluation.figure import figure_png
+from riseg_drake.evaluation.figure_table import markdown_table, percent, score_cells, table_figures
 from riseg_drake.evaluation.in_motion import InMotion
 from riseg_drake.evaluation.published import PUBLISHED
-from riseg_drake.evaluation.report import (
-    disturbance_cells,
-    ending_counts,
-    markdown_table,
-    percent,
-    report_text,
-    score_cells,
-    table_figures,
-)
+from riseg_drake.evaluation.report import disturbance_cells, ending_counts, report_text
 from riseg_drake.evaluation.scene_result import SceneResult
 from riseg_drake.evaluation.scores import Scores
 from riseg_drake.evaluation.step_means import EMPTY_PREDICTION
@@ -192,7 +185,7 @@ def test_ours_and_each_switch_are_in_percent_after_the_last_interaction():
     assert rows(text, "no memory") == [
         ["100.0", "0.0", "80.0", "100.0", "0.0", "0.0", "80.0", "-10.0", "60.0", "-20.0"]
     ]
-    assert "In scene_000 *no memory* failed on the way and keeps what it had: out of memory\n" in text
+    assert "scene_000: no memory failed on the way and keeps what it had: out of memory\n" in text
 
 
 def test_the_figure_is_a_picture(tmp_path):

@@ -122,6 +122,12 @@ def test_a_switch_is_compared_over_the_scenes_of_all_kinds_each_carried_to_its_e
     assert "no memory" not in suite_text([TOYS, PILE], {})
 
 
+def test_a_version_that_failed_is_named_with_its_kind():
+    broken = replace(LONG, ablation={"no memory": ()}, ablation_failures={"no memory": "out of memory"})
+    text = suite_text([replace(TOYS, scenes=[broken]), replace(PILE, scenes=[SHORT])], {})
+    assert "\ntoys, scene_000: no memory failed on the way and keeps what it had: out of memory\n" in text
+
+
 def test_the_most_frequent_end_comes_first():
     kind = replace(TOYS, scenes=[SHORT, LONG, BROKEN, LONG, LONG, BROKEN])
     assert list(kind.endings.items()) == [

@@ -32,11 +32,13 @@ def bench_command(
     sam: bool,
     json_file: Path | None,
     console: Console,
+    view: bool = False,
 ) -> None:
     """Render one push, put it through the segmentation again and again, print what it cost.
 
     The figures go to `json_file`, too, if one is named. With `stream` say instead how evenly commands come for
-    so many seconds beside that, with `sam` what frames lose while Segment Anything works beside them.
+    so many seconds beside that, with `sam` what frames lose while Segment Anything works beside them, with
+    `view` what the live view costs.
     """
     scenario = load_scenario(scenario_file)
     _ = scenario.simulated  # says so where it is not
@@ -53,6 +55,11 @@ def bench_command(
         from riseg_drake.app.bench.sam import bench_sam
 
         return bench_sam(scenario, images, console)
+    if view:
+        from riseg_drake.app.bench.view import bench_view
+
+        with console.status("measuring with and without the view"):
+            return bench_view(scenario, images, json_file, console)
     with console.status("measuring time"):
         clock, pairs = StageClock(), PairTimes()
         for _ in range(REPETITIONS):

@@ -8,7 +8,8 @@ import numpy as np
 
 from riseg_drake.app.evaluate.scene_folder import SceneTask
 from riseg_drake.app.output_folder import SUMMARY, read_json
-from riseg_drake.app.report_page import Moment, Report, View, report_html, scores_table, told_facts, view
+from riseg_drake.app.report_page import Moment, Report, Table, View, report_html, scores_table, told_facts, view
+from riseg_drake.evaluation.ablation_report import TITLE, ablation_failures, ablation_table
 from riseg_drake.evaluation.report import ending_counts
 from riseg_drake.evaluation.scene_result import SceneResult, scores_by_method
 from riseg_drake.evaluation.step_means import step_means
@@ -35,6 +36,7 @@ def evaluation_page(
     steps = [(str(i), mean) for i, mean in enumerate(step_means([r.scores for r in results], last_step))]
     scenes = [(f"{r.name}, {r.ended or 'otherwise'}", r.scores[-1]) for r in results if r.scores]
     endings = ", ".join(f"{number} {ended}" for ended, number in ending_counts(results).items())
+    ablation = ablation_table(results, last_step)
     settings = summary.get("evaluation", {})
     facts = [(name, str(settings[name])) for name in ("scenario", "seed") if name in settings]
     return report_html(
@@ -45,11 +47,13 @@ def evaluation_page(
             views=views,
             moments=moments,
             objects=None,
-            doubts=[f"{r.name} (seed {r.seed}) failed: {r.failure}" for r in results if r.failure],
+            doubts=[f"{r.name} (seed {r.seed}) failed: {r.failure}" for r in results if r.failure]
+            + ablation_failures(results),
             tables=[
                 scores_table(means, "method"),
                 scores_table(steps, "after interaction"),
                 scores_table(scenes, "scene, and how it ended"),
+                *([Table(f"{TITLE}, in percent", ablation.head, ablation.rows)] if ablation else []),
             ],
         )
     )

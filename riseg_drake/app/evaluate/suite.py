@@ -31,11 +31,12 @@ from riseg_drake.app.report_page import REPORT as PAGE
 from riseg_drake.app.scenario import Scenario, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError
 from riseg_drake.app.tables import score_table
+from riseg_drake.evaluation.ablation_report import ablation_figures
 from riseg_drake.evaluation.figure import figure_png
 from riseg_drake.evaluation.report import FIGURE_FILE, report_text
 from riseg_drake.evaluation.scene_result import SceneResult
 from riseg_drake.evaluation.step_means import step_means
-from riseg_drake.evaluation.suite_report import KindResult, suite_figures, suite_text
+from riseg_drake.evaluation.suite_report import KindResult, of_all_kinds, suite_figures, suite_text
 from riseg_drake.recording.whole_file import write_bytes, write_text
 
 SCENES = 5
@@ -143,7 +144,8 @@ def evaluate_suite(
             results = [_of_kind(kind, group, outcomes, settings) for kind, group in tasks.items()]
             write_text(path / REPORT, suite_text(results, settings))
             write_text(path / PAGE, suite_page(results, path, settings))
-        folder.note(state="done", kinds=suite_figures(results))
+        ablation = ablation_figures(*of_all_kinds(results))
+        folder.note(state="done", kinds=suite_figures(results), ablation=ablation)
     return results
 
 

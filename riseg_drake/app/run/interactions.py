@@ -136,6 +136,7 @@ def interactions(
             progress.end = _and(f"{longest:g} s were {'over' if wall else 'simulated'}", progress.decision.why)
         elif progress.end and wall and book.has_seen:
             yield book.close(wired.interaction_step(context))
+    wired.show_end(context)
 
 
 def _why(decision: Decision, made: int, most: int) -> str:

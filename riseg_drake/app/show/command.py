@@ -1,6 +1,6 @@
 """`riseg pictures`: the pictures of README and documentation, made anew from today's code.
 
-run.gif                   one run: the wrist camera's image with its masks beside the robot
+run.webp                  one run: the wrist camera's image with its masks beside the robot
 run.jpg                   the masks before the first and after every interaction
 simulation_diagram.svg    the wired diagrams
 hardware_diagram.svg
@@ -23,12 +23,12 @@ from riseg_drake.app.show.drawing import draw, render, require_dot
 from riseg_drake.app.show.film import film_run
 from riseg_drake.evaluation.report import FIGURE_FILE
 from riseg_drake.geometry.camera import WHOLE, bounding_region
-from riseg_drake.pictures.animation import gif
+from riseg_drake.pictures.animation import film
 from riseg_drake.pictures.masks import draw_masks
 from riseg_drake.recording.whole_file import write_bytes
 
 NAMES = (
-    "run.gif",
+    "run.webp",
     "run.jpg",
     f"{BUILT_IN}_diagram.svg",
     f"{HARDWARE}_diagram.svg",
@@ -66,11 +66,11 @@ def pictures_command(
             raise OutputError(f"{figure} is not there; give the output folder of `riseg evaluate`")
         pictures["evaluation.png"] = figure.read_bytes()
     with console.status("placing the objects") as status:
-        film, steps = film_run(
+        moving, steps = film_run(
             scenario, seed, lambda p: status.update(f"interaction {p.interaction_step}, {p.phase.value}")
         )
         status.update("drawing")
-        pictures["run.gif"] = gif(film, RATE, LAST)
+        pictures["run.webp"] = film(moving, RATE, LAST)
         pictures["run.jpg"] = _strip(steps)
         for name in (BUILT_IN, HARDWARE):
             dot = draw(make_diagram(load_scenario(None, name), seed).diagram)

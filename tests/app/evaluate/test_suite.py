@@ -123,6 +123,20 @@ def test_an_ablation_segments_the_recorded_scenes_of_every_kind_again(suite, tmp
     # Ours found all of it, and had 50 in motion.
     cells = [cell.strip() for cell in row.strip("| ").split("|")]
     assert [cells[3], *cells[8:]] == ["66.7", "-33.3 ± 0.0", "25.0", "-25.0 ± 0.0"]
+    page = (output / "report.html").read_text()
+    assert "<h2>What each part is worth, over all kinds, in percent</h2>" in page
+    of_switch = re.search(r"<tr><td>no memory.*?</tr>", page, re.DOTALL)[0]
+    assert re.findall("<td>(.*?)</td>", of_switch)[1:] == cells[1:]
+    of_kind = (output / "2_late" / "report.html").read_text()
+    assert "<h2>What each part is worth, in percent</h2>" in of_kind
+    figures = json.loads((output / "summary.json").read_text())["ablation"]
+    assert list(figures) == ["riseg_drake", *versions()]
+    assert figures["riseg_drake"]["in_motion_f"] == 0.5
+    assert figures["riseg_drake"]["against_ours"] is None
+    (name,) = (name for name in figures if name.startswith("no memory"))
+    assert figures[name]["scores"]["Objects F-measure"] == pytest.approx(2 / 3)
+    assert figures[name]["against_ours"] == {"mean": pytest.approx(-1 / 3), "standard_error": 0}
+    assert figures[name]["in_motion_against_ours"] == {"mean": -0.25, "standard_error": 0}
 
 
 def test_the_folder_of_something_else_is_refused(suite, tmp_path, runs):

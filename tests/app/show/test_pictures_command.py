@@ -6,7 +6,7 @@ from PIL import Image
 
 from riseg_drake.app.cli import main
 
-LARGEST_GIF = 4_000_000  # bytes
+LARGEST_FILM = 400_000  # bytes
 
 
 @pytest.mark.renders
@@ -17,10 +17,10 @@ def test_all_pictures_are_made_and_can_be_opened(small_scenario, tmp_path):
     (evaluation / "figure.png").write_bytes(b"a figure")
     arguments = ["pictures", str(small_scenario), "--seed", "1", "--output", str(output)]
     assert main([*arguments, "--evaluation", str(evaluation)]) == 0
-    with Image.open(output / "run.gif") as film:
+    with Image.open(output / "run.webp") as film:
         assert film.n_frames > 10
         assert 600 < film.width <= 800
-    assert (output / "run.gif").stat().st_size < LARGEST_GIF
+    assert (output / "run.webp").stat().st_size < LARGEST_FILM
     assert cv2.imread(str(output / "run.jpg")) is not None
     for name in ("simulation", "hardware"):
         assert "MaskPropagator" in (output / f"{name}_diagram.svg").read_text()
