@@ -82,8 +82,9 @@ def gain_in_errors(frames: Sequence[Frame], agreement: NDArray, near: float) -> 
     `near` pixels.
 
     What a whole edge says is said by each of its pixels, and in each frame again: the parts of the image, over
-    all frames, tell how far chance goes. 0 where edges lie in too few of them; `agreement` is that of
-    `edge_agreement`.
+    all frames, tell how far chance goes. 0 where edges lie in too few of them.
+
+    `agreement` [2 * rows + 1, 2 * columns + 1] is that of `edge_agreement`.
     """
     rows, columns = REACH
     dv, du = np.mgrid[-rows : rows + 1, -columns : columns + 1]
