@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import Intrinsics
 
+LIKELY_DEPTH = (0.1, 10.0)
+"""m; a median depth outside most often means a wrong depth_scale."""
+
 
 class Immutable:
     """Base of values that nobody changes once they are made, so that a copy may be the thing itself.
@@ -156,3 +159,12 @@ def sanitize_depth(depth: NDArray) -> NDArray[np.float32]:
     with np.errstate(over="ignore"):
         depth = np.asarray(depth).astype(np.float32)
     return np.where((depth > _NEAREST) & (depth < _FARTHEST), depth, np.float32(0))
+
+
+def unlikely_median(depth: NDArray[np.float32]) -> float | None:
+    """The median of a depth image [H, W], m, 0 = invalid, where no table scene has it; None where it is likely,
+    or there is no depth."""
+    if not (depth > 0).any():
+        return None
+    median = float(np.median(depth[depth > 0]))
+    return None if LIKELY_DEPTH[0] <= median <= LIKELY_DEPTH[1] else median

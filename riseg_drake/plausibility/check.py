@@ -6,7 +6,7 @@ from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.plausibility.limits import PlausibilityLimits
 from riseg_drake.plausibility.poses import doubts_about_poses, seen_pair
 from riseg_drake.plausibility.registration import doubts_about_registration
-from riseg_drake.plausibility.scale import doubts_about_scale
+from riseg_drake.plausibility.scale import doubts_about_distance, doubts_about_scale
 from riseg_drake.plausibility.scene import doubts_about_content, doubts_about_jumps
 from riseg_drake.plausibility.views import View, small_view
 
@@ -37,7 +37,11 @@ def doubts(
     """
     limits = limits or PlausibilityLimits()
     if count < 2:
-        return ["there is one frame only: what moved is told from two; record more of them"]
+        frame = read(0) if count else None
+        return [
+            "there is one frame only: what moved is told from two; record more of them",
+            *doubts_about_distance([] if frame is None else [frame.depth]),
+        ]
     numbers = _moments(count)
     read_before: dict[int, View | None] = {}
 
@@ -55,8 +59,9 @@ def doubts(
     frame = read(numbers[0])
     pixels = frame.intrinsics.width / views[0].frame.intrinsics.width if frame else 1.0
     frames = [view.frame for view in views]
+    scale = [] if depth_scale is None else doubts_about_scale(views, depth_scale, limits)
     return [
-        *([] if depth_scale is None else doubts_about_scale(views, depth_scale, limits)),
+        *(scale or doubts_about_distance([frame.depth for frame in frames])),
         *doubts_about_registration(frames, pixels, limits),
         *doubts_about_poses(pairs, poses, limits, pixels),
         *doubts_about_jumps([(a, b) for a, b in near if a and b], limits),
@@ -67,7 +72,7 @@ def doubts(
 def looked_at(count: int) -> list[int]:
     """The numbers of the frames that `doubts` reads of so many, for who must read them one after the other."""
     if count < 2:
-        return []
+        return list(range(count))
     return sorted({min(n + apart, count - 1) for n in _moments(count) for apart in (0, 1, _APART)})
 
 

@@ -29,6 +29,10 @@ class PlausibilityLimits:
     shift_gain: float = 1.03
     """How much better edges must agree at another shift than where they lie. On right recordings it is 1.01 at
     most (docs/recordings.md); at 8 pixels 1.4 to 2.7, but 1.05 on a real one whose depth is of low quality."""
+    shift_errors: float = 1.0
+    """... and by how many of its own standard errors, as the parts of the image tell them. Drawn things, whose
+    texture is as strong as their edges, reach 0.6 in small images; at 8 pixels the real recording of low
+    quality has 1.2, all others at least 2.2."""
     jump: float = 0.06
     """Share of the image's width that things may move by between two frames: optical flow is worked out that
     far around them. Right recordings reach 0.04, jumps of 50 mm at half a metre 0.08."""

@@ -20,6 +20,9 @@ _FEWEST = 100
 """Pixels on edges of depth, over all frames, to say anything."""
 _STRONG = 0.95
 """Quantile of the gradients of an image; what is stronger counts no more than that."""
+_PART, _FEWEST_PARTS = 20, 10
+"""Pixels a side of the parts of an image that agree by chance each for itself, and how many must have edges: of
+fewer some shift is always liked by all."""
 _SMOOTH_COLOR, _SMOOTH_DEPTH = 1.0, 2.0
 """Pixels (standard deviation) over which the directions of edges are taken: those of depth are ragged."""
 
@@ -50,20 +53,10 @@ def edge_agreement(frames: Sequence[Frame]) -> NDArray[np.float64] | None:
     total = np.zeros((2 * rows + 1, 2 * columns + 1))
     count = 0
     for frame in frames:
-        edges = _depth_edges(frame)
-        count += np.count_nonzero(edges)
-        depth = np.where(frame.depth > 0, frame.depth, frame.depth.max())
-        across = _doubled_angle(*_gradient(depth.astype(np.float32), _SMOOTH_DEPTH))
-        gray = cv2.cvtColor(frame.color, cv2.COLOR_RGB2GRAY).astype(np.float32)
-        x, y = _gradient(gray, _SMOOTH_COLOR)
-        strength = np.hypot(x, y)
-        strength = np.minimum(strength / max(float(np.quantile(strength, _STRONG)), 1e-3), 1.0)
-        strength[frame.robot] = 0
-        for direction, normal in zip(_doubled_angle(x, y), across, strict=True):
-            around = cv2.copyMakeBorder(
-                strength * direction, rows, rows, columns, columns, cv2.BORDER_REFLECT_101
-            )
-            total += 0.5 * cv2.matchTemplate(around, np.where(edges, normal, 0), cv2.TM_CCORR)
+        edges = _edges(frame)
+        count += edges.count
+        for color, normal in zip(edges.color, edges.normals, strict=True):
+            total += 0.5 * cv2.matchTemplate(color, normal, cv2.TM_CCORR)
     return total / count if count >= _FEWEST else None
 
 
@@ -84,6 +77,30 @@ def best_shift(agreement: NDArray, near: float) -> Shift:
     return Shift(float((weight * du).sum()), float((weight * dv).sum()), best, here)
 
 
+def gain_in_errors(frames: Sequence[Frame], agreement: NDArray, near: float) -> float:
+    """By how many of its own standard errors edges agree better at the best shift than at the best one within
+    `near` pixels.
+
+    What a whole edge says is said by each of its pixels, and in each frame again: the parts of the image, over
+    all frames, tell how far chance goes. 0 where edges lie in too few of them.
+
+    `agreement` [2 * rows + 1, 2 * columns + 1] is that of `edge_agreement`.
+    """
+    rows, columns = REACH
+    dv, du = np.mgrid[-rows : rows + 1, -columns : columns + 1]
+    within = np.where(np.hypot(dv, du) <= near, agreement, -1)
+    best, here = (divmod(int(np.argmax(values)), agreement.shape[1]) for values in (agreement, within))
+    gains = np.zeros(-(-np.array(frames[0].depth.shape) // _PART))
+    for frame in frames:
+        edges = _edges(frame)
+        gain = edges.agreement(*best) - edges.agreement(*here)
+        for v, u in np.ndindex(*gains.shape):
+            gains[v, u] += gain[v * _PART : (v + 1) * _PART, u * _PART : (u + 1) * _PART].sum()
+    if np.count_nonzero(gains) < _FEWEST_PARTS:
+        return 0.0
+    return float(gains.sum() / np.sqrt(np.square(gains).sum()))
+
+
 def doubts_about_registration(frames: Sequence[Frame], pixels: float, limits: PlausibilityLimits) -> list[str]:
     """Whether depth lies beside colour, in one line or none; one pixel of `frames` is so many of the images."""
     agreement = edge_agreement(frames)
@@ -92,11 +109,51 @@ def doubts_about_registration(frames: Sequence[Frame], pixels: float, limits: Pl
     shift = best_shift(agreement, limits.shift)
     if np.hypot(shift.u, shift.v) <= limits.shift or shift.best < limits.shift_gain * shift.here:
         return []
+    if gain_in_errors(frames, agreement, limits.shift) < limits.shift_errors:
+        return []
     return [
         "depth lies beside colour: its edges agree better with those of colour if it is shifted "
         f"by ({pixels * shift.u:+.0f}, {pixels * shift.v:+.0f}) pixels (right, down), {shift.best:.2f} against "
         f"{shift.here:.2f}; depth must be aligned to colour"
     ]
+
+
+@dataclass(frozen=True)
+class _Edges:
+    """Edges of depth, and gradients of colour, of one frame."""
+
+    count: int
+    """Pixels on edges of depth."""
+    normals: list[NDArray[np.float32]]
+    """1, cos 2a, sin 2a [H, W] of the edges' directions; 0 where there is none."""
+    color: list[NDArray[np.float32]]
+    """The same of colour, times how strong it is; wider by REACH on all sides."""
+
+    def agreement(self, row: int, column: int) -> NDArray[np.float32]:
+        """[H, W]: what each pixel of an edge adds at one of the shifts, as `edge_agreement` counts them."""
+        height, width = self.normals[0].shape
+        there = [color[row : row + height, column : column + width] for color in self.color]
+        return np.float32(0.5) * np.sum(np.multiply(self.normals, there), axis=0)
+
+
+def _edges(frame: Frame) -> _Edges:
+    rows, columns = REACH
+    edges = _depth_edges(frame)
+    depth = np.where(frame.depth > 0, frame.depth, frame.depth.max())
+    across = _doubled_angle(*_gradient(depth.astype(np.float32), _SMOOTH_DEPTH))
+    gray = cv2.cvtColor(frame.color, cv2.COLOR_RGB2GRAY).astype(np.float32)
+    x, y = _gradient(gray, _SMOOTH_COLOR)
+    strength = np.hypot(x, y)
+    strength = np.minimum(strength / max(float(np.quantile(strength, _STRONG)), 1e-3), 1.0)
+    strength[frame.robot] = 0
+    return _Edges(
+        int(np.count_nonzero(edges)),
+        [np.where(edges, normal, np.float32(0)) for normal in across],
+        [
+            cv2.copyMakeBorder(strength * direction, rows, rows, columns, columns, cv2.BORDER_REFLECT_101)
+            for direction in _doubled_angle(x, y)
+        ],
+    )
 
 
 def _gradient(image: NDArray[np.float32], smooth: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -4,7 +4,9 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
+from riseg_drake.geometry.rgbd import unlikely_median
 from riseg_drake.plausibility.limits import PlausibilityLimits
 from riseg_drake.plausibility.views import View
 
@@ -64,3 +66,15 @@ def doubts_about_scale(views: Sequence[View], depth_scale: float, limits: Plausi
             f"known, and puts the table {distance:.2g} m away; right is {usual}"
         ]
     return []
+
+
+def doubts_about_distance(depths: Sequence[NDArray[np.float32]]) -> list[str]:
+    """Whether what depth images [H, W], m, see is where no table scene is, in one line or none: of use where
+    they show no table."""
+    unlikely = [median for depth in depths if (median := unlikely_median(depth)) is not None]
+    if not unlikely or 2 * len(unlikely) < len(depths):
+        return []
+    return [
+        f"the median depth is {np.median(unlikely):.3g} m, which is unlikely; "
+        'is "depth_scale" (units per metre) right?'
+    ]

@@ -38,6 +38,14 @@ def image_lists(folder: Path, options: SourceOptions, inside: Path | None) -> Im
     Raises RecordingError where there are none, or where it is not clear which, or when they were taken.
     """
     color_file, depth_file = folder / layout.COLOR_LIST, folder / layout.DEPTH_LIST
+    if unknown := sorted(set(options.topics) - {"color", "depth"}):
+        raise RecordingError(
+            f"--topics: {unknown[0]!r} is not color or depth, and a folder has no other images"
+        )
+    if options.world_frame is not None:
+        raise RecordingError(f"--world-frame is for the transforms of a bag, and {folder} is a folder")
+    if options.rate is not None and not options.topics and color_file.exists():
+        raise RecordingError(f"--rate is for images without a list, and {color_file} has a stamp for each")
     if not options.topics and (color_file.exists() or depth_file.exists() or not _is_numbered(folder)):
         color, repeated = read_file_list(color_file, inside)
         depth, unordered = read_file_list(depth_file, inside)

@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.geometry.rgbd import unlikely_median
 from riseg_drake.recording.layout import LeftOut, RecordedFrame
 from riseg_drake.recording.stamped_lists import StampedTable
 
 STAMP_LIMIT = 0.02
 """How far the stamps of what belongs together may lie apart, s; the TUM tools' own value."""
-LIKELY_DEPTH = (0.1, 10.0)
-"""m; a median depth outside most often means a wrong depth_scale."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +54,8 @@ class RecordedSource(ABC):
     """The joint angles, None without any."""
     left_out: list[LeftOut]
     warnings: list[str]
+    scale_is_asked: bool = False
+    """Whether somebody else asks before the work whether depth is likely, and reading need not."""
 
     @abstractmethod
     def __len__(self) -> int:
@@ -88,10 +89,8 @@ class RecordedSource(ABC):
 
     def _look_at_scale(self, depth: NDArray[np.float32], file: Path | str) -> None:
         """Warn of a depth [H, W], m, that is unlikely on the whole; `file` says what it is measured in."""
-        if not (depth > 0).any():
-            return
-        median = float(np.median(depth[depth > 0]))
-        if not LIKELY_DEPTH[0] <= median <= LIKELY_DEPTH[1]:
+        median = None if self.scale_is_asked else unlikely_median(depth)
+        if median is not None:
             self.warnings.append(
                 f"{file}: the median depth is {median:.3g} m, which is unlikely; "
                 f'is "depth_scale" (units per metre) right?'

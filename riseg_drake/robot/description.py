@@ -14,6 +14,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, Frame, ModelInstanceIndex
 
+from riseg_drake.host.model_files import check_model
 from riseg_drake.robot.limits import ROBOTS, RobotLimits
 from riseg_drake.robot.tool import NO_CAMERA, ToolError, add_tool, tool_file
 from riseg_drake.robot.tool_shape import tool_shape
@@ -88,7 +89,8 @@ def find_packages(parser: Parser, file: Path) -> None:
     """Make the `package://NAME/` and `model://NAME/` known to a parser that lie beside a file.
 
     As ROS has it, NAME is the package (package.xml) that the file lies in; as Gazebo has it, a folder that it
-    lies in, or one beside such a folder.
+    lies in, or one beside such a folder. Raises ModelFileError for a mesh in one of them that no reader is to
+    be given.
     """
     packages = parser.package_map()
     folders = file.resolve().parents
@@ -96,12 +98,14 @@ def find_packages(parser: Parser, file: Path) -> None:
         if (folder / "package.xml").is_file():
             packages.AddPackageXml(str(folder / "package.xml"))
             break
-    for name in sorted(set(_PACKAGE_NAMED.findall(file.read_text(errors="replace")))):
+    named = sorted(set(_PACKAGE_NAMED.findall(file.read_text(errors="replace"))))
+    for name in named:
         found = (
             at for at in (*folders, *(folder / name for folder in folders)) if at.name == name and at.is_dir()
         )
         if not packages.Contains(name) and (beside := next(found, None)):
             packages.Add(name, str(beside))
+    check_model(file, {name: Path(packages.GetPath(name)) for name in named if packages.Contains(name)})
 
 
 def add_panda(

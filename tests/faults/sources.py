@@ -25,7 +25,9 @@ ROBOT = """<robot name="gantry"><link name="base"><visual><geometry><mesh filena
 <limit lower="-1" upper="1" effort="1" velocity="1"/></joint><link name="camera"/>
 <joint name="mount" type="fixed"><parent link="hand"/><child link="camera"/>
 <origin xyz="0 0 0.45" rpy="3.14159265 0 0"/></joint></robot>"""
-BASE = "v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+BASE = (
+    "mtllib base.mtl\nusemtl gray\nv 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+)
 
 
 def state_of(folder: Path) -> dict[str, int]:
@@ -84,6 +86,8 @@ def _robot(place: Path) -> None:
     (place / "gantry").mkdir()
     (place / "gantry" / "gantry.urdf").write_text(ROBOT)
     (place / "gantry" / "base.obj").write_text(BASE)
+    (place / "gantry" / "base.mtl").write_text("newmtl gray\nKd 0.5 0.5 0.5\nmap_Kd gray.png\n")
+    cv2.imwrite(str(place / "gantry" / "gray.png"), np.full((8, 8, 3), 128, np.uint8))
     (place / "gantry" / "base.stl").write_bytes(b"solid that nobody reads")
 
 

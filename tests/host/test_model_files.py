@@ -1,10 +1,14 @@
 """Model files are looked at before Drake's parsers see them."""
 
+import json
 import os
 
 import pytest
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
 
 from riseg_drake.host.model_files import ModelFileError, check_model
+from riseg_drake.robot.description import find_packages
 from riseg_drake.stations.object_models import SceneError, find_models
 
 BOX = """<robot name="box"><link name="box"><inertial><mass value="0.1"/>
@@ -108,3 +112,52 @@ def test_meshes_that_are_files_or_drakes_to_find_pass(tmp_path, name, uri):
     (tmp_path / "mesh.obj").write_text("v 0 0 0")
     (tmp_path / name).write_text(MESH[name].format(uri))
     check_model(tmp_path / name)
+
+
+@pytest.mark.parametrize("scheme", ["package", "model"])
+@pytest.mark.parametrize("name", MESH)
+def test_a_mesh_of_a_package_beside_the_model_is_looked_at_too(tmp_path, name, scheme):
+    (tmp_path / "gantry").mkdir()
+    os.mkfifo(tmp_path / "gantry" / "mesh.obj")
+    (tmp_path / "gantry" / name).write_text(MESH[name].format(f"{scheme}://gantry/mesh.obj"))
+    with pytest.raises(ModelFileError, match=r"its mesh .*gantry/mesh\.obj is not a file"):
+        find_packages(Parser(MultibodyPlant(0.0)), tmp_path / "gantry" / name)
+
+
+OBJ = "mtllib {}\nv 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+PARTS = {
+    "material": {"mesh.obj": OBJ.format("part")},
+    "texture": {"mesh.obj": OBJ.format("a b.mtl"), "a b.mtl": "newmtl m\nmap_Kd -s 1 1 1 part\n"},
+    "buffer": {"mesh.gltf": json.dumps({"buffers": [{"byteLength": 4, "uri": "p%61rt"}]})},
+    "image": {"mesh.gltf": json.dumps({"images": [{"uri": "data:image/png;base64,"}, {"uri": "part"}]})},
+}
+
+
+@pytest.mark.parametrize("files", PARTS.values(), ids=PARTS)
+def test_what_a_mesh_names_is_looked_at_too(tmp_path, files):
+    (tmp_path / "box.urdf").write_text(MESH["box.urdf"].format(next(iter(files))))
+    for name, content in files.items():
+        (tmp_path / name).write_text(content)
+    check_model(tmp_path / "box.urdf")
+    (tmp_path / "part").write_text("")
+    check_model(tmp_path / "box.urdf")
+    (tmp_path / "part").unlink()
+    os.mkfifo(tmp_path / "part")
+    with pytest.raises(ModelFileError, match=r"its mesh's part .*/part is not a file"):
+        check_model(tmp_path / "box.urdf")
+
+
+@pytest.mark.parametrize(
+    "content", ["[[[", "[1]", '{"buffers": 3, "images": [{"uri": 7}, 1]}', "\xff", "[" * 10**5]
+)
+def test_gltf_that_is_none_is_for_its_reader_to_refuse(tmp_path, content):
+    (tmp_path / "box.urdf").write_text(MESH["box.urdf"].format("mesh.gltf"))
+    (tmp_path / "mesh.gltf").write_text(content)
+    check_model(tmp_path / "box.urdf")
+
+
+def test_materials_that_name_themselves_or_nothing_come_to_an_end(tmp_path):
+    (tmp_path / "box.urdf").write_text(MESH["box.urdf"].format("mesh.obj"))
+    (tmp_path / "mesh.obj").write_text(OBJ.format("a.mtl") + "mtllib \x1c\nmtllib \t \n")
+    (tmp_path / "a.mtl").write_text("map_Kd a.mtl\nmap_Kd \n")
+    check_model(tmp_path / "box.urdf")

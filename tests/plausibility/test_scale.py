@@ -3,10 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from riseg_drake.plausibility.check import doubts
 from riseg_drake.plausibility.limits import PlausibilityLimits
-from riseg_drake.plausibility.scale import doubts_about_scale, scene_scale
+from riseg_drake.plausibility.scale import doubts_about_distance, doubts_about_scale, scene_scale
 from riseg_drake.plausibility.views import small_view
-from tests.plausibility.filmed import hand_held
+from tests.plausibility.filmed import hand_held, reader
 
 LIMITS = PlausibilityLimits()
 
@@ -57,3 +58,31 @@ def test_without_a_table_nothing_is_said_about_its_size(film):
     nothing = [replace(frame, depth=np.zeros_like(frame.depth)) for frame in film]
     assert scene_scale(views(nothing)) is None
     assert doubts_about_scale(views(nothing), 1000.0, LIMITS) == []
+
+
+@pytest.mark.parametrize(
+    ("metres", "odd"), [(0.09, True), (0.11, False), (9.9, False), (10.1, True), (0, False)]
+)
+def test_where_no_table_is_seen_the_median_depth_tells(metres, odd):
+    depth = np.full((6, 8), metres, np.float32)
+    depth[:2] = 0
+    said = f'the median depth is {metres:g} m, which is unlikely; is "depth_scale" (units per metre) right?'
+    assert doubts_about_distance([depth, np.zeros_like(depth), depth]) == ([said] if odd else [])
+    assert doubts_about_distance([np.full_like(depth, 0.5), np.full_like(depth, 0.5), depth]) == []
+
+
+@pytest.mark.parametrize(("table", "times"), [(True, 0.1), (True, 0.2), (True, 50.0), (False, 0.2)])
+def test_a_wrong_unit_is_said_once_with_a_table_and_without(film, times, table):
+    """Tenths of the distance are below 10 cm, too, and fifty times as far is beyond 10 m."""
+    rough = np.random.default_rng(0).uniform(0.3, 0.6, film[0].depth.shape).astype(np.float32)
+    wrong = [replace(f, depth=(f.depth if table else rough) * np.float32(times)) for f in film]
+    lines = [line for line in doubts(reader(wrong), 2, 1000 / times, None) if "depth_scale" in line]
+    assert len(lines) == 1
+    assert ("puts the table" in lines[0]) == table
+
+
+def test_a_single_frame_is_asked_how_far_away_things_are(film):
+    far = [replace(film[0], depth=film[0].depth * np.float32(100))]
+    one, distance = doubts(reader(far), 1, 10.0, None)
+    assert one.startswith("there is one frame only")
+    assert distance.startswith("the median depth is 45 m")

@@ -10,6 +10,7 @@ from riseg_drake.geometry.se3 import exp_se3, inverse
 from riseg_drake.recording.layout import RecordingError
 from riseg_drake.recording.reader import RecordingReader
 from riseg_drake.recording.source import SourceOptions
+from tests.recording.made_recordings import SMALL, drawn_frames, write
 
 WIDTH, HEIGHT = 40, 32
 CAMERA = {"width": WIDTH, "height": HEIGHT, "fx": 40, "fy": 40, "cx": 20, "cy": 16, "depth_scale": 1000}
@@ -131,3 +132,18 @@ def test_masks_of_jpeg_images_go_by_the_stem(numbered):
     put(numbered / "label" / "0.png", np.full(SHAPE, 3, np.uint8))
     (frame,) = read(numbered, rate=1.0)
     np.testing.assert_array_equal(frame.labels, np.full(SHAPE, 3))
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"topics": {"colour": "rgb"}}, r"--topics: 'colour' is not color or depth"),
+        ({"topics": {"color": "rgb", "pose": "/pose"}}, r"--topics: 'pose' is not color or depth"),
+        ({"world_frame": "map"}, r"--world-frame is for the transforms of a bag"),
+        ({"rate": 30.0}, r"--rate is for images without a list, and .*rgb\.txt has a stamp for each"),
+    ],
+)
+def test_an_option_that_a_folder_has_no_use_for_is_said(tmp_path, options, says):
+    folder = write(tmp_path / "listed", drawn_frames(1), SMALL)
+    with pytest.raises(RecordingError, match=says):
+        read(folder, **options)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from riseg_drake.recording.source import LIKELY_DEPTH, STAMP_LIMIT, RecordedSource, SourceOptions
+from riseg_drake.geometry.rgbd import LIKELY_DEPTH
+from riseg_drake.recording.source import STAMP_LIMIT, RecordedSource, SourceOptions
 
 
 class Stamped(RecordedSource):

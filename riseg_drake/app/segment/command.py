@@ -129,6 +129,7 @@ def segment_command(request: SegmentRequest, console: Console) -> None:
     scenario, seed = _parameters(request)
     view = recorded_view(reader, scenario, request.robot, request.camera_frame)
     doubts = recording_doubts(reader, view)
+    reader.scale_is_asked = True
     if request.strict and (odd := [*reader.warnings, *doubts]):
         raise RecordingError("; ".join(odd))
     view.warnings.extend(doubts)

@@ -1,5 +1,6 @@
 """A bag is doubted as the folder of the same frames is."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'riseg-drake[bags]'")
 
+from riseg_drake.app.cli import main
 from riseg_drake.app.scenario import load_scenario
 from riseg_drake.app.segment.doubts import recording_doubts
 from riseg_drake.app.segment.recorded_view import recorded_view
@@ -81,4 +83,20 @@ def test_few_frames_are_read_however_many_there_are(count):
     numbers = looked_at(count)
     assert len(numbers) <= 18
     assert all(0 <= number < count for number in numbers)
-    assert (len(numbers) > 0) == (count > 1)
+    assert (len(numbers) > 0) == (count > 0)
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize("kind", ["folder", "bag"])
+@pytest.mark.parametrize("times", [0.1, 0.2, 100.0])
+def test_depth_in_a_wrong_unit_is_said_once_whatever_tells_it(tmp_path, film, times, kind):
+    frames = recorded(film[:6], times)
+    source = (
+        write(tmp_path / kind, frames, film[0].intrinsics)
+        if kind == "folder"
+        else write_bag(tmp_path / kind, frames, film[0].intrinsics, BagKind())
+    )
+    assert main(["segment", str(source), "--output", str(tmp_path / "out")]) == 0
+    said = json.loads((tmp_path / "out" / "summary.json").read_text())["warnings"]
+    told = [line for line in said if line.startswith('"depth_scale"') or "the median depth" in line]
+    assert len(told) == 1
