@@ -293,7 +293,7 @@ def test_a_placed_object_that_cannot_be_says_why(placed, message):
 
 
 @pytest.mark.renders
-def test_packed_cartons_have_a_neighbour_within_a_millimetre_and_stay():
+def test_packed_cartons_hang_together_by_gaps_of_a_millimetre_and_stay():
     config = load_scenario(KINDS["packed"]).simulated.scene
     figures = [packed(config, seed) for seed in range(20)]
     assert [str(each) for each in figures if not each.holds] == []
