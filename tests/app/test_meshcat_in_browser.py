@@ -2,14 +2,12 @@
 
 import json
 import re
-from itertools import count
 
 import cv2
 import numpy as np
 import pytest
-from pydrake.geometry import Box, Meshcat, Rgba
+from pydrake.geometry import Meshcat
 
-from riseg_drake.app.meshcat_replay import FRAME_RATE, replay
 from riseg_drake.app.output import REPLAY, RunFolder
 from riseg_drake.app.run.command import run
 from riseg_drake.app.scenario import load_scenario
@@ -120,24 +118,3 @@ def test_an_interaction_is_found_again_by_its_mark(page):
     expected = share * page.ask("viewer.animator.duration")
     assert page.ask("viewer.animator.time") == pytest.approx(expected, abs=0.02)
     assert page.complaints == []
-
-
-def moment_lost_by_the_slider():
-    """s; the end of a replay, which the 15 digits that a slider keeps put before itself."""
-    kept = (float(np.float32(frame / FRAME_RATE)) for frame in count(60))
-    return next(end for end in kept if float(f"{end:.15g}") < end)
-
-
-def test_the_end_of_the_slider_shows_what_comes_at_the_very_end(tmp_path):
-    meshcat, file, end = Meshcat(), tmp_path / REPLAY, moment_lost_by_the_slider()
-    with replay(meshcat, file):
-        meshcat.SetObject("/riseg/last", Box(0.1, 0.1, 0.1), Rgba(1, 0, 0))
-        meshcat.SetProperty("/riseg/last", "visible", False, 0.0)
-        meshcat.SetProperty("/riseg/last", "visible", True, end + 0.25 / FRAME_RATE)  # within that frame
-    slider = "document.querySelector('#riseg-track input')"
-    with opened(file.as_uri()) as page:
-        page.wait(f"Number({slider}.max) === viewer.animator.duration")
-        assert page.ask("viewer.animator.duration") == end
-        for value, shown in ((f"{slider}.max / 2", []), (f"{slider}.max", ["/riseg/last/<object>"])):
-            page.ask(f"{slider}.value = {value}; {slider}.dispatchEvent(new Event('input'))")
-            assert page.ask(f"({SHOWN})()") == shown
