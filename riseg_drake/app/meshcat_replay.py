@@ -38,6 +38,8 @@ def replay(meshcat: Meshcat, file: Path, start: float = 0.0) -> Iterator[Replay]
     meshcat.StartRecording(FRAME_RATE, set_visualizations_while_recording=True)
     # Its frames are numbered from there: with wall time there would be more of them than numbers.
     meshcat.get_mutable_recording().set_start_time(start)
+    # The live view stays as the run ended instead of beginning anew; the replay's own page plays it.
+    meshcat.get_mutable_recording().set_autoplay(False)
     kept = Replay(start)
     try:
         yield kept

@@ -17,6 +17,7 @@ def refusal(arguments, capsys):
     [
         (["segmnt", "x"], "segment"),
         (["hardwear"], "hardware"),
+        (["--verison"], "--version"),
         (["run", "--ouput", "x"], "--output"),
         (["run", "--overwirte=yes"], "--overwrite"),
         (["score", "--jsno", "f", "a", "b"], "--json"),

@@ -88,6 +88,7 @@ def evaluate_command(request: EvaluationRequest, console: Console) -> None:
     results = evaluate(tasks, pool, last_step, console, given, request.overwrite)
     _print_scores(results, last_step, console)
     console.print(f"report in {folder / REPORT}")
+    console.print(f"to look at: {folder / PAGE}", highlight=False, soft_wrap=True)
     failures = [result.failure for result in results if result.failure]
     if len(failures) == len(results):
         raise EvaluationError(f"every scene failed; the first: {failures[0]}")

@@ -90,6 +90,7 @@ def suite_command(request: SuiteRequest, console: Console) -> None:
     console.print("\nafter the last interaction, means over the scenes of each kind, in percent")
     console.print(score_table(rows, first="\nkind"))
     console.print(f"report in {folder / REPORT}")
+    console.print(f"to look at: {folder / PAGE}", highlight=False, soft_wrap=True)
     failures = [scene.failure for each in results for scene in each.scenes]
     if all(failures):
         raise EvaluationError(f"every scene failed; the first: {failures[0]}")

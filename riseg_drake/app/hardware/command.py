@@ -24,6 +24,7 @@ from riseg_drake.app.loop_request import LoopRequest
 from riseg_drake.app.meshcat_replay import replay, stay
 from riseg_drake.app.output import RECORDING, REPLAY, RunFolder, Step
 from riseg_drake.app.planned_speed import check_limits, planned_limits
+from riseg_drake.app.report_page import REPORT
 from riseg_drake.app.run.command import Narrator, export_listener, report, state_of, timeline_listener
 from riseg_drake.app.run.interactions import Listener, Progress, TruthSource, WallClock, interactions
 from riseg_drake.app.run.recording import recording_of
@@ -113,6 +114,7 @@ def hardware_command(request: HardwareRequest, console: Console) -> None:
     report(steps, console)
     exports.tell(console)
     timeline.tell(console)
+    console.print(f"to look at: {folder.path / REPORT}", highlight=False, soft_wrap=True)
     if browser is not None:
         stay(browser, folder.path / REPLAY, console, request.wait, operator.wait_for_enter)
 

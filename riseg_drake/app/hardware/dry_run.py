@@ -60,6 +60,8 @@ class DryRun:
 
     def _end(self, why: str) -> Permission:
         self._progress.end = why
+        if self._planned is not None:
+            self._planned.hide()
         return Permission.END
 
     def _describe(self, push: Push) -> None:

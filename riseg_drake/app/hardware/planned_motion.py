@@ -3,8 +3,8 @@
 from collections.abc import Callable
 
 import numpy as np
-from pydrake.geometry import Meshcat, MeshcatVisualizerParams, Rgba
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.geometry import Meshcat, MeshcatVisualizerParams, Rgba, Role, SceneGraph
+from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from riseg_drake.app.scenario import Scenario
 from riseg_drake.pushing.push import Push
@@ -36,6 +36,7 @@ class PlannedMotion:
         builder.ExportInput(angles, "position")
         self._diagram = builder.Build()
         self._context = self._diagram.CreateDefaultContext()
+        self._parts = _drawn_parts(self._diagram)
 
     def show(self, push: Push) -> None:
         """To be called again and again: the arm of glass is where the motion would be by now."""
@@ -47,7 +48,9 @@ class PlannedMotion:
             way = np.array([self._kinematics.X_WE(push.path.position(t))[:3, 3] for t in times])
             self._meshcat.SetLine(f"{PATH}/way", way.T, 3.0, WAY_COLOR)
             self._place(push.path.position(0.0), now)
-            self._meshcat.SetProperty(f"{PATH}/arm", "modulated_opacity", GLASS)
+            # Of each part by itself: a page that is opened later gets what is around a part before the part.
+            for part in self._parts:
+                self._meshcat.SetProperty(f"{PATH}/arm/{part}", "modulated_opacity", GLASS)
             self._meshcat.SetProperty(PATH, "visible", True, now)
         passed = (now - self._since) % (push.path.duration + PAUSE)
         self._place(push.path.position(min(passed, push.path.duration)), now)
@@ -62,3 +65,12 @@ class PlannedMotion:
         self._diagram.get_input_port().FixValue(self._context, q)
         self._context.SetTime(now)
         self._diagram.ForcedPublish(self._context)
+
+
+def _drawn_parts(diagram: Diagram) -> list[str]:
+    """What a MeshcatVisualizer calls the shapes of a diagram that it draws."""
+    (scene_graph,) = (system for system in diagram.GetSystems() if isinstance(system, SceneGraph))
+    inspector = scene_graph.model_inspector()
+    shapes = inspector.GetAllGeometryIds(Role.kIllustration)
+    names = [(inspector.GetName(inspector.GetFrameId(shape)), inspector.GetName(shape)) for shape in shapes]
+    return [f"{frame}/{name}".replace("::", "/") for frame, name in names]

@@ -17,9 +17,13 @@ class Browser:
     """Sees what is planned."""
 
     def __init__(self):
-        self.shown = []
+        self.shown, self.is_hidden = [], True
+
+    def hide(self):
+        self.is_hidden = True
 
     def show(self, push):
+        self.is_hidden = False
         if not self.shown or self.shown[-1] is not push:
             self.shown.append(push)
 
@@ -81,8 +85,11 @@ def test_the_operator_reads_where_the_tip_goes_and_how_high():
 
 
 def test_the_operator_may_end_it():
-    run, *_ = made("q")
+    run, browser, *_ = made("n", "q")
+    assert run.permit(push()) is Permission.SKIP
+    assert not browser.is_hidden
     assert run.permit(push()) is Permission.END
+    assert browser.is_hidden  # what will never be done
     assert run._progress.end == "the operator ended it"
 
 

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from pydrake.geometry import Meshcat
 
-from riseg_drake.app.hardware.planned_motion import PATH, PAUSE, PlannedMotion
+from riseg_drake.app.hardware.planned_motion import GLASS, PATH, PAUSE, PlannedMotion
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.robot.kinematics import READY, PandaKinematics
 from tests.app.test_meshcat_push import push
+from tests.browser import MISSING, opened
 
 DURATION, TURN = 2.0, 0.3
 
@@ -71,3 +72,27 @@ def test_it_is_kept_at_wall_time_in_a_recording_that_begins_then(scene):
     motion.show(planned())
     motion.hide()
     meshcat.PublishRecording()
+
+
+OPACITIES = """
+    () => {
+      const found = [];
+      viewer.scene_tree.find(["riseg", "planned", "arm"]).object.traverse(part => {
+        if (part.material) found.push(...[part.material].flat().map(each => each.opacity));
+      });
+      return found;
+    }
+"""
+
+
+@pytest.mark.renders
+@pytest.mark.skipif(bool(MISSING), reason=MISSING)
+@pytest.mark.parametrize("kind", ["live", "replay"])
+def test_the_arm_is_of_glass_for_who_opens_the_page_later_too(scene, tmp_path, kind):
+    meshcat, motion, *_ = scene
+    motion.show(planned())
+    (tmp_path / "replay.html").write_text(meshcat.StaticHtml())
+    url = meshcat.web_url() if kind == "live" else (tmp_path / "replay.html").as_uri()
+    with opened(url) as page:
+        page.wait(f"({OPACITIES})().length >= {len(motion._parts)}")
+        assert set(page.ask(f"({OPACITIES})()")) == {GLASS}

@@ -4,10 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
 
-from riseg_drake.app.run.interactions import Truth, _Book
+from riseg_drake.app.run.interactions import Progress, Truth, _Book, interactions
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.pushing.arm_path import ArmPhase
+from riseg_drake.pushing.decision import UNDECIDED
 from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.segmentation.segmentation import nothing_segmented
 from riseg_drake.systems.stage_clock import StageClock
@@ -86,3 +90,34 @@ def test_where_nobody_knows_the_truth_nothing_is_scored():
         book.count(frame(2 * step), is_at_rest=False)
         book.count(frame(2 * step + 1), is_at_rest=True)
         assert book.close(step).in_motion is None
+
+
+class Idle(Scene):
+    """A diagram in which nothing happens, and when its end was shown."""
+
+    stages = ()
+
+    def __init__(self):
+        super().__init__()
+        builder = DiagramBuilder()
+        builder.AddSystem(ConstantVectorSource([0.0]))
+        self.diagram, self.ends = builder.Build(), []
+
+    def segmentation(self, _):
+        return nothing_segmented(SIZE)
+
+    def phase(self, _):
+        return ArmPhase.OBSERVE
+
+    def last_decision(self, _):
+        return UNDECIDED
+
+    def show_end(self, context):
+        self.ends.append(context.get_time())
+
+
+def test_a_run_that_is_over_shows_its_end_once():
+    idle, progress = Idle(), Progress()
+    assert list(interactions(idle, StageClock(), progress, 0.5, truth=lambda *_: None)) == []
+    assert progress.end.startswith("0.5 s were simulated")
+    assert idle.ends == [0.5]
