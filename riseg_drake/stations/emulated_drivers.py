@@ -195,8 +195,8 @@ class PandaSide:
             rate = 1e6 * (self.published - published) / elapsed
             self._ears.note(
                 f"this computer is too slow: {1e-6 * self._skipped_us:.1f} of the last {1e-6 * elapsed:.0f} s "
-                f"were skipped, and the arm's status came at {rate:.0f} Hz; fewer pictures (`emulator.rate`, but "
-                "more than 2 a second, else the arm pauses for late ones) leave more for the arm"
+                f"were skipped, and the arm's status came at {rate:.0f} Hz; fewer pictures (`emulator.rate`, "
+                "but more than 2 a second, else the arm pauses for late ones) leave more for the arm"
             )
         self._skipped_us, self._told_at = 0, (wall_us, self.published)
 
