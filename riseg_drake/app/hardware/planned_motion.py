@@ -16,6 +16,8 @@ GLASS = 0.35
 """Opacity of the arm that does not move yet."""
 PAUSE = 1.0
 """Between the end of the motion and its beginning, s."""
+BEFORE = 0.05
+"""So long before it is shown a thing is said to be hidden, s: in a replay it is so from the beginning, then."""
 POINTS = 200
 """Of the way of the tip."""
 WAY_COLOR = Rgba(0.84, 0.37, 0.0)
@@ -31,6 +33,8 @@ class PlannedMotion:
         self._kinematics = PandaKinematics(panda, X_WC)
         self._push: Push | None = None
         self._since = 0.0
+        self._way = ""
+        self._number = 0  # of the ways that were shown
         builder = DiagramBuilder()
         angles = add_arm_view(builder, panda, X_WC, meshcat, MeshcatVisualizerParams(prefix=f"{PATH}/arm"))
         builder.ExportInput(angles, "position")
@@ -46,11 +50,13 @@ class PlannedMotion:
             self._push, self._since = push, now
             times = np.linspace(0, push.path.duration, POINTS)
             way = np.array([self._kinematics.X_WE(push.path.position(t))[:3, 3] for t in times])
-            self._meshcat.SetLine(f"{PATH}/way", way.T, 3.0, WAY_COLOR)
+            self._show_way(way, now)
             self._place(push.path.position(0.0), now)
             # Of each part by itself: a page that is opened later gets what is around a part before the part.
             for part in self._parts:
                 self._meshcat.SetProperty(f"{PATH}/arm/{part}", "modulated_opacity", GLASS)
+            if self._number == 1:
+                self._meshcat.SetProperty(PATH, "visible", False, now - BEFORE)
             self._meshcat.SetProperty(PATH, "visible", True, now)
         passed = (now - self._since) % (push.path.duration + PAUSE)
         self._place(push.path.position(min(passed, push.path.duration)), now)
@@ -60,6 +66,16 @@ class PlannedMotion:
         if self._push is not None:
             self._push = None
             self._meshcat.SetProperty(PATH, "visible", False, self._clock())
+
+    def _show_way(self, p_WE: np.ndarray, now: float) -> None:
+        """Show the way [N, 3], m, of this push alone: a recording keeps visibility, not a line that changes."""
+        if self._way:
+            self._meshcat.SetProperty(self._way, "visible", False, now)
+        self._number += 1
+        self._way = f"{PATH}/way/{self._number}"
+        self._meshcat.SetLine(self._way, p_WE.T, 3.0, WAY_COLOR)
+        self._meshcat.SetProperty(self._way, "visible", False, now - BEFORE)
+        self._meshcat.SetProperty(self._way, "visible", True, now)
 
     def _place(self, q: np.ndarray, now: float) -> None:
         self._diagram.get_input_port().FixValue(self._context, q)

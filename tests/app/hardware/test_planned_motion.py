@@ -5,6 +5,7 @@ import pytest
 from pydrake.geometry import Meshcat
 
 from riseg_drake.app.hardware.planned_motion import GLASS, PATH, PAUSE, PlannedMotion
+from riseg_drake.app.meshcat_replay import replay
 from riseg_drake.app.scenario import HARDWARE, load_scenario
 from riseg_drake.robot.kinematics import READY, PandaKinematics
 from tests.app.test_meshcat_push import push
@@ -74,6 +75,13 @@ def test_it_is_kept_at_wall_time_in_a_recording_that_begins_then(scene):
     meshcat.PublishRecording()
 
 
+WAYS = """
+    () => {
+      const planned = viewer.scene_tree.find(["riseg", "planned"]);
+      const ways = Object.entries(planned.children["way"].children);
+      return planned.object.visible ? ways.filter(([_, way]) => way.object.visible).map(([name]) => name) : [];
+    }
+"""
 OPACITIES = """
     () => {
       const found = [];
@@ -96,3 +104,22 @@ def test_the_arm_is_of_glass_for_who_opens_the_page_later_too(scene, tmp_path, k
     with opened(url) as page:
         page.wait(f"({OPACITIES})().length >= {len(motion._parts)}")
         assert set(page.ask(f"({OPACITIES})()")) == {GLASS}
+
+
+@pytest.mark.renders
+@pytest.mark.skipif(bool(MISSING), reason=MISSING)
+def test_a_replay_shows_each_planned_way_in_its_time_alone(scene, tmp_path):
+    meshcat, motion, clock, _ = scene
+    file = tmp_path / "replay.html"
+    with replay(meshcat, file, start=clock.now):
+        for _ in range(2):  # from 1 s on, and from 2 s on
+            clock.now += 1.0
+            motion.show(planned())
+        clock.now += 1.0
+        motion.hide()
+    with opened(file.as_uri()) as page:
+        page.wait("viewer.animator.duration > 0")
+        page.ask("viewer.animator.pause()")
+        for time, shown in ((0.5, []), (1.5, ["1"]), (2.5, ["2"]), (3.0, [])):
+            page.ask(f"viewer.animator.seek({time})")
+            assert page.ask(f"({WAYS})()") == shown, time
