@@ -11,6 +11,7 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from riseg_drake.stations.layouts import Habit, Spot, centred, lay_out
 from riseg_drake.stations.object_models import ObjectModel, SceneError, find_model, find_models
 from riseg_drake.stations.placed_object import PlacedObject
+from riseg_drake.stations.placement import check_apart
 from riseg_drake.stations.settling import lay_pile, settle
 
 __all__ = ["PlacedConfig", "SceneConfig", "draw_scene", "make_scene", "place_scene"]
@@ -90,7 +91,7 @@ def make_scene(config: SceneConfig, rng: np.random.Generator) -> list[PlacedObje
 
 
 def place_scene(placed: Sequence[PlacedConfig]) -> list[PlacedObject]:
-    """Objects exactly where they are said to be. Raises SceneError."""
+    """Objects exactly where they are said to be. Raises SceneError, also for what is in the table or another."""
     objects = []
     for k, item in enumerate(placed):
         if len(item.X_WB) != 6:
@@ -98,7 +99,13 @@ def place_scene(placed: Sequence[PlacedConfig]) -> list[PlacedObject]:
                 f"placed[{k}].X_WB: {len(item.X_WB)} numbers; expected x, y, z in m and roll, pitch, yaw in rad"
             )
         X_WB = RigidTransform(RollPitchYaw(item.X_WB[3:]), item.X_WB[:3])
-        objects.append(PlacedObject(find_model(item.model), X_WB))
+        try:
+            model = find_model(item.model)
+        except SceneError as error:
+            said = str(error).removeprefix("model: ").removeprefix("objects: ")
+            raise SceneError(f"placed[{k}].model: {said}") from None
+        objects.append(PlacedObject(model, X_WB))
+    check_apart(objects)
     return objects
 
 

@@ -24,7 +24,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
-from pydrake.multibody.tree import BodyIndex, Frame, ModelInstanceIndex, PdControllerGains
+from pydrake.multibody.tree import BodyIndex, Frame, ModelInstanceIndex, PdControllerGains, RigidBody
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import Demultiplexer, StateInterpolatorWithDiscreteDerivative
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
@@ -40,8 +40,10 @@ from riseg_drake.robot.description import (
 from riseg_drake.robot.kinematics import PandaKinematics, observation_posture
 from riseg_drake.robot.limits import check_start_position
 from riseg_drake.stations.contact import let_touch, set_contact_model
+from riseg_drake.stations.footprint import footprint
 from riseg_drake.stations.object_models import resolve
 from riseg_drake.stations.placed_object import PlacedObject, add_scene, object_id_table
+from riseg_drake.stations.placement import check_in_view, check_on_top
 from riseg_drake.stations.scene import SceneConfig, make_scene
 from riseg_drake.stations.sleep import Sleep
 from riseg_drake.stations.wrist_camera import CameraConfig, ObjectLabels, WristCamera
@@ -138,7 +140,8 @@ def add_world(
         let_touch(plant, scene_graph, pushing, rigid=True)
     for instance in (panda.arm, panda.tool):
         plant.set_gravity_enabled(instance, False)
-    _add_table(plant, scene_graph, config.table)
+    table = _add_table(plant, scene_graph, config.table)
+    by_hand = objects is None and config.scene.placed
     if objects is None:
         objects = make_scene(config.scene, np.random.default_rng(seed))
     object_bodies = add_scene(plant, scene_graph, objects)
@@ -146,6 +149,12 @@ def add_world(
     _set_gains(plant, panda.arm, config)
     plant.Finalize()
     plant.SetDefaultPositions(panda.arm, start_position(config))
+    if by_hand:
+        geometries = plant.GetCollisionGeometriesForBody(table)
+        X_WT = RigidTransform([*config.table.centre_W, 0.0])
+        check_on_top(objects, footprint(scene_graph.model_inspector(), geometries, X_WT))
+        X_WC = panda.camera_frame.CalcPoseInWorld(plant.CreateDefaultContext())
+        check_in_view(objects, X_WC, config.camera.intrinsics)
     return SimulatedWorld(plant, scene_graph, panda, list(objects), object_bodies)
 
 
@@ -262,7 +271,8 @@ def _set_gains(plant: MultibodyPlant, arm: ModelInstanceIndex, config: Simulated
                 actuator.set_controller_gains(PdControllerGains(p=config.stiffness, d=config.damping))
 
 
-def _add_table(plant: MultibodyPlant, scene_graph: SceneGraph, config: TableConfig) -> None:
+def _add_table(plant: MultibodyPlant, scene_graph: SceneGraph, config: TableConfig) -> RigidBody:
+    """Add the table with its looks; returns its body."""
     parser = Parser(plant)
     register_models(parser)
     (table,) = parser.AddModels(url=config.url)
@@ -271,7 +281,7 @@ def _add_table(plant: MultibodyPlant, scene_graph: SceneGraph, config: TableConf
     plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform([*config.centre_W, 0.0]))
     let_touch(plant, scene_graph, plant.GetCollisionGeometriesForBody(body), rigid=True)
     if not config.color and not config.texture:
-        return
+        return body
     texture = resolve(config.texture) if config.texture else None
     if texture is not None and not texture.is_file():
         raise ValueError(f"table texture: no file {config.texture}; expected a PNG or JPEG image")
@@ -289,3 +299,4 @@ def _add_table(plant: MultibodyPlant, scene_graph: SceneGraph, config: TableConf
         if texture is not None:
             looks.AddProperty("phong", "diffuse_map", str(texture))
         scene_graph.AssignRole(source, geometry, looks)
+    return body

@@ -264,11 +264,11 @@ def test_placed_objects_stand_exactly_where_the_scenario_says(tmp_path):
     write_plain_models(tmp_path)
     placed = [
         PlacedConfig(str(tmp_path / "brick.sdf"), [0.5, 0.1, 0.02, 0.0, 0.0, 0.5]),
-        PlacedConfig(str(tmp_path / "can"), [0.4, -0.1, 0.025, 0.1, 0.2, 0.3]),
+        PlacedConfig(str(tmp_path / "can"), [0.4, -0.1, 0.035, 0.1, 0.2, 0.3]),
     ]
     scene = make_scene(SceneConfig(placed=placed), np.random.default_rng(0))
     assert [item.name for item in scene] == ["brick", "can"]
-    np.testing.assert_array_equal(scene[1].X_WB.translation(), [0.4, -0.1, 0.025])
+    np.testing.assert_array_equal(scene[1].X_WB.translation(), [0.4, -0.1, 0.035])
     # Roll, pitch, yaw are turns about W's x, y, z, one after the other.
     R = (
         RotationMatrix.MakeZRotation(0.3)
@@ -281,7 +281,7 @@ def test_placed_objects_stand_exactly_where_the_scenario_says(tmp_path):
 @pytest.mark.parametrize(
     ("placed", "message"),
     [
-        (PlacedConfig("no/such.sdf"), "no file no/such.sdf"),
+        (PlacedConfig("no/such.sdf"), r"^placed\[0\].model: no file no/such.sdf"),
         (PlacedConfig(HOUSEHOLD[0]), "0 models in"),
         (PlacedConfig(f"{HOUSEHOLD[0]}/box_white", [0.5, 0.0]), "2 numbers; expected x, y, z"),
     ],
