@@ -68,7 +68,9 @@ class SceneConfig:
     """Fewest objects in a scene; if left out 4 (paper), in a crowd 8, in a pile 5."""
     count_max: int | None = None
     """Most objects in a scene; if left out 6 (paper), in a crowd 12, in a pile 7."""
-    centre_W: list[float] = field(default_factory=lambda: [0.5, 0.0])
+    centre_W: list[float] = field(
+        default_factory=lambda: [0.5, 0.0], metadata={"sizes": (2,), "least": -1.5, "most": 1.5}
+    )
     """Middle of the work area on the table, x and y in W, m."""
     radius: float | None = None
     """No part of an object is further from the middle than this, m; if left out 0.15, packed 0.17, in a pile
@@ -91,13 +93,15 @@ def make_scene(config: SceneConfig, rng: np.random.Generator) -> list[PlacedObje
 
 
 def place_scene(placed: Sequence[PlacedConfig]) -> list[PlacedObject]:
-    """Objects exactly where they are said to be. Raises SceneError, also for what is in the table or another."""
+    """Objects exactly where they are said to be. Raises SceneError, also for one in the table or another."""
     objects = []
     for k, item in enumerate(placed):
         if len(item.X_WB) != 6:
             raise SceneError(
                 f"placed[{k}].X_WB: {len(item.X_WB)} numbers; expected x, y, z in m and roll, pitch, yaw in rad"
             )
+        if np.abs(item.X_WB[3:]).max() > 2 * np.pi:
+            raise SceneError(f"placed[{k}].X_WB: {item.X_WB}; roll, pitch, yaw are radians, at most 2 pi")
         X_WB = RigidTransform(RollPitchYaw(item.X_WB[3:]), item.X_WB[:3])
         try:
             model = find_model(item.model)

@@ -37,7 +37,7 @@ from riseg_drake.robot.description import (
     add_panda,
     register_models,
 )
-from riseg_drake.robot.kinematics import PandaKinematics, observation_posture
+from riseg_drake.robot.kinematics import OBSERVE_HEIGHTS, OBSERVE_PITCHES, PandaKinematics, observation_posture
 from riseg_drake.robot.limits import check_start_position
 from riseg_drake.stations.contact import let_touch, set_contact_model
 from riseg_drake.stations.footprint import footprint
@@ -70,9 +70,11 @@ class TableConfig:
 
     url: str = "package://riseg_drake_models/table/table.sdf"
     """A model of one link, its origin in the middle of the top face."""
-    centre_W: list[float] = field(default_factory=lambda: [0.45, 0.0])
+    centre_W: list[float] = field(
+        default_factory=lambda: [0.45, 0.0], metadata={"sizes": (2,), "least": -5.0, "most": 5.0}
+    )
     """Where its middle stands, x and y in W, m."""
-    color: list[float] = field(default_factory=list)
+    color: list[float] = field(default_factory=list, metadata={"sizes": (0, 3), "least": 0.0, "most": 1.0})
     """Red, green, blue of the top, 0 to 1; empty: as the model says (white)."""
     texture: str = ""
     """A PNG or JPEG file, or a `package://` URL of one, laid over the top; empty: none."""
@@ -90,16 +92,16 @@ class SimulatedStationConfig:
     """Lights, shadows and background of the camera's pictures."""
     time_step: float = field(default=0.002, metadata={"least": 0.0005, "most": 0.02})
     """Longest step of the simulation, s; shortened so that a whole number of steps makes a picture."""
-    stiffness: float = 2000.0
+    stiffness: float = field(default=2000.0, metadata={"least": 1.0, "most": 1e6})
     """Proportional gain of every joint's controller, N m / rad."""
-    damping: float = 200.0
+    damping: float = field(default=200.0, metadata={"least": 0.0, "most": 1e5})
     """Derivative gain of every joint's controller, N m s / rad."""
     start_position: list[float] = field(default_factory=list, metadata={"sizes": (0, 7)})
     """Joint angles at the start, rad, 7; empty: looking at the middle of the work area."""
-    observe_height: float = 0.5
+    observe_height: float = field(default=0.5, metadata=OBSERVE_HEIGHTS)
     """Distance of the camera from there at the start, m: its height, where it looks straight down. Unused
     where start_position is given."""
-    observe_pitch: float = 0.0
+    observe_pitch: float = field(default=0.0, metadata=OBSERVE_PITCHES)
     """How far the view leans from straight down at the start, rad (0.785 is 45 degrees), from the side where
     the arm has most room. Unused where start_position is given."""
 

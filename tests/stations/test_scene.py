@@ -284,6 +284,7 @@ def test_placed_objects_stand_exactly_where_the_scenario_says(tmp_path):
         (PlacedConfig("no/such.sdf"), r"^placed\[0\].model: no file no/such.sdf"),
         (PlacedConfig(HOUSEHOLD[0]), "0 models in"),
         (PlacedConfig(f"{HOUSEHOLD[0]}/box_white", [0.5, 0.0]), "2 numbers; expected x, y, z"),
+        (PlacedConfig(f"{HOUSEHOLD[0]}/box_white", [0.5, 0, 0, 0, 0, 90.0]), "are radians"),
     ],
 )
 def test_a_placed_object_that_cannot_be_says_why(placed, message):
