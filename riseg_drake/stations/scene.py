@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +14,7 @@ from riseg_drake.stations.placed_object import PlacedObject
 from riseg_drake.stations.placement import check_apart
 from riseg_drake.stations.settling import lay_pile, settle
 
-__all__ = ["PlacedConfig", "SceneConfig", "draw_scene", "make_scene", "place_scene"]
+__all__ = ["PlacedConfig", "SceneConfig", "check_placed", "draw_scene", "make_scene", "place_scene"]
 
 DROP = 2e-4  # m; how far above its resting height an object starts
 LAYOUTS_OF_A_CHOICE = 5
@@ -83,13 +83,32 @@ class SceneConfig:
     """Smallest gap otherwise, m."""
     gap_max: float = 0.012
     """Largest gap otherwise, m."""
-    placed: list[PlacedConfig] = field(default_factory=list)
-    """Objects in places of one's own; with any, nothing is drawn."""
+    placed: list[PlacedConfig] | None = None
+    """Objects in places of one's own, at least one; nothing is drawn then."""
+
+
+_DRAWN = tuple(each.name for each in fields(SceneConfig) if each.name not in ("centre_W", "placed"))
+"""Keys that say what is drawn."""
 
 
 def make_scene(config: SceneConfig, rng: np.random.Generator) -> list[PlacedObject]:
     """The objects that are placed, or a drawn scene. Raises SceneError."""
-    return place_scene(config.placed) if config.placed else draw_scene(config, rng)
+    check_placed(config)
+    return draw_scene(config, rng) if config.placed is None else place_scene(config.placed)
+
+
+def check_placed(config: SceneConfig) -> None:
+    """Raise SceneError where a scene is said to be placed and nothing is, or something to be drawn, too."""
+    if config.placed is None:
+        return
+    if not config.placed:
+        raise SceneError("placed: an empty list; expected one object or more, or no `placed`, to draw a scene")
+    own = SceneConfig()
+    drawn = [key for key in _DRAWN if getattr(config, key) != getattr(own, key)]
+    if drawn:
+        raise SceneError(
+            f"{', '.join(drawn)}: of no account where objects are `placed`; leave out the one or the other"
+        )
 
 
 def place_scene(placed: Sequence[PlacedConfig]) -> list[PlacedObject]:

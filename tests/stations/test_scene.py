@@ -293,6 +293,49 @@ def test_a_placed_object_that_cannot_be_says_why(placed, message):
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"placed": []}, "placed: an empty list; expected one object or more"),
+        ({"count_min": 2}, "count_min: of no account where objects are `placed`"),
+        ({"layout": "pile", "radius": 0.2}, "layout, radius: of no account"),
+        ({"objects": HOUSEHOLD, "names": ["can_tuna"]}, "objects, names: of no account"),
+        ({"gap_max": 0.05, "touch_probability": 1.0}, "touch_probability, gap_max: of no account"),
+    ],
+)
+def test_a_scene_is_drawn_or_placed_and_not_both_or_neither(options, message):
+    config = SceneConfig(**{"placed": [PlacedConfig(f"{HOUSEHOLD[0]}/box_white")], **options})
+    with pytest.raises(SceneError, match=message) as error:
+        make_scene(config, np.random.default_rng(0))
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("find", "wrong", "near"),
+    [
+        (find_models, "package://riseg_drake_models/houshold", "models/household"),
+        (find_models, "package://riseg_drake_models/houshold/box_white", "models/household"),
+        (find_model, f"{HOUSEHOLD[0]}/box_wite", "household/box_white"),
+        (find_models, "{folder}/thngs", "{folder}/things"),
+        (find_model, "{folder}/things/brik.sdf", "{folder}/things/brick.sdf"),
+    ],
+)
+def test_a_misspelt_folder_or_model_is_answered_with_the_nearest_name(tmp_path, find, wrong, near):
+    (tmp_path / "things").mkdir()
+    write_plain_models(tmp_path / "things")
+    with pytest.raises(SceneError) as error:
+        find(wrong.format(folder=tmp_path))
+    said = str(error.value)
+    assert "\n" not in said
+    assert said.endswith(f"{near.format(folder=tmp_path)}?")
+    assert "; did you mean " in said
+
+
+def test_another_package_than_the_models_of_this_one_is_named():
+    with pytest.raises(SceneError, match=r"riseg_drke_models/household: no such package; expected package://"):
+        find_models("package://riseg_drke_models/household")
+
+
 @pytest.mark.renders
 def test_packed_cartons_have_a_neighbour_within_a_millimetre_and_stay():
     config = load_scenario(KINDS["packed"]).simulated.scene
