@@ -33,6 +33,8 @@ HEAVIEST = 20.0
 INERTIA_SHARE = 4.0
 """Of the largest moment of inertia that a body of an object's mass and collision shape can have: the shape may
 be simpler than the body."""
+_UPRIGHT = 0.99
+"""Cosine of the angle, 8 degrees, by which an upright axis may lean."""
 _OWN = "package://riseg_drake_models/"
 _FEW = 5
 """Models that are named."""
@@ -60,6 +62,11 @@ class ObjectModel:
     """Its centre of mass p_BBcm [3], m."""
     axes: NDArray
     """Unit vectors in B [k, 3] about which it is a body of revolution: none; one of a can, three of a ball."""
+
+    @property
+    def has_flat_sides(self) -> bool:
+        """Whether, as it stands, it is more than round about the vertical, so that it can lie flush."""
+        return not bool(np.any(np.abs(self.axes @ self.X_WB.rotation().matrix()[2]) > _UPRIGHT))
 
 
 def find_models(folders: str | Sequence[str], names: Sequence[str] = ()) -> list[ObjectModel]:

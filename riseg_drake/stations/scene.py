@@ -141,6 +141,12 @@ def draw_scene(config: SceneConfig, rng: np.random.Generator) -> list[PlacedObje
             f"count_min: {kind.count_min} different objects wanted, but {_named(config.objects)} offers "
             f"{len(models)}; add models or ask for fewer"
         )
+    round_ones = [model.name for model in models if not model.has_flat_sides]
+    if config.layout == "packed" and len(models) - len(round_ones) < min(2, len(models)):
+        raise SceneError(
+            f"layout: packed lays flat sides together, but {_named(round_ones)} are round; "
+            "add things with flat sides, or use layout: spread"
+        )
     count = int(rng.integers(kind.count_min, min(kind.count_max, len(models)) + 1))
     restless = ""
     for choice in itertools.count():
@@ -164,7 +170,7 @@ def draw_scene(config: SceneConfig, rng: np.random.Generator) -> list[PlacedObje
             break
     if restless:
         raise SceneError(f"{restless}; model it with z up, standing on a face or on three points or more")
-    raise _no_room(chosen, kind)
+    raise _no_room(chosen, kind, config.layout)
 
 
 def _laid(
@@ -189,9 +195,10 @@ def _reach(placed: Sequence[PlacedObject], centre_W: Sequence[float]) -> float:
     return float(np.linalg.norm(corners - centre_W, axis=1).max())
 
 
-def _no_room(chosen: Sequence[ObjectModel], kind: _Layout) -> SceneError:
+def _no_room(chosen: Sequence[ObjectModel], kind: _Layout, layout: str) -> SceneError:
+    what = "come to rest as a pile" if layout == "pile" else "fit"
     return SceneError(
-        f"{len(chosen)} objects ({', '.join(model.name for model in chosen)}) do not fit within "
+        f"{len(chosen)} objects ({', '.join(model.name for model in chosen)}) do not {what} within "
         f"{kind.radius:g} m of the middle; ask for fewer, smaller ones, or enlarge radius"
     )
 
@@ -207,6 +214,8 @@ def _kind(config: SceneConfig) -> _Layout:
     radius = own.radius if config.radius is None else config.radius
     if not 1 <= low <= high:
         raise SceneError(f"count_min, count_max: {low}, {high}; expected 1 <= min <= max")
+    if config.layout == "pile" and low < 2:
+        raise SceneError(f"count_min, count_max: {low}, {high}; a pile is 2 things or more, one on another")
     if len(config.centre_W) != 2:
         raise SceneError(f"centre_W: {config.centre_W}; expected x and y in metres")
     if radius <= 0:

@@ -310,6 +310,30 @@ def test_a_scene_is_drawn_or_placed_and_not_both_or_neither(options, message):
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize("counts", [{"count_min": 1, "count_max": 1}, {"count_max": 1}, {"count_min": 1}])
+def test_a_pile_of_one_is_refused_for_what_it_is(counts):
+    with pytest.raises(SceneError, match="a pile is 2 things or more"):
+        draw(0, layout="pile", **counts)
+
+
+def test_a_pile_that_never_rests_is_not_said_to_be_too_large(monkeypatch):
+    monkeypatch.setattr(scene_module, "lay_pile", lambda *_: None)
+    with pytest.raises(SceneError, match=r"2 objects \(.*\) do not come to rest as a pile within 0.2 m"):
+        draw(0, layout="pile", count_min=2, count_max=2)
+
+
+@pytest.mark.parametrize("names", [["bowl_blue", "can_tuna"], ["box_white", "bowl_blue", "can_tuna"]])
+def test_packed_wants_two_things_with_flat_sides(names):
+    with pytest.raises(SceneError, match=r"^layout: packed lays flat sides together, but .*can_tuna are round"):
+        draw(0, layout="packed", objects=HOUSEHOLD, names=names, count_min=2, count_max=2)
+
+
+def test_boxes_and_cans_that_lie_have_flat_sides_and_what_stands_round_has_none():
+    names = ["bowl_blue", "box_white", "can_soda_lying", "can_tuna", "remote"]
+    flat = {model.name: model.has_flat_sides for model in find_models(HOUSEHOLD, names)}
+    assert [name for name in names if flat[name]] == ["box_white", "can_soda_lying", "remote"]
+
+
 @pytest.mark.parametrize(
     ("find", "wrong", "near"),
     [
