@@ -155,8 +155,9 @@ def add_world(
         geometries = plant.GetCollisionGeometriesForBody(table)
         X_WT = RigidTransform([*config.table.centre_W, 0.0])
         check_on_top(objects, footprint(scene_graph.model_inspector(), geometries, X_WT))
-        X_WC = panda.camera_frame.CalcPoseInWorld(plant.CreateDefaultContext())
-        check_in_view(objects, X_WC, config.camera.intrinsics)
+        if panda.camera_frame is not None:
+            X_WC = panda.camera_frame.CalcPoseInWorld(plant.CreateDefaultContext())
+            check_in_view(objects, X_WC, config.camera.intrinsics)
     return SimulatedWorld(plant, scene_graph, panda, list(objects), object_bodies)
 
 
