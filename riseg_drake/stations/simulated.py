@@ -9,6 +9,7 @@ from pydrake.geometry import (
     ColorRenderCamera,
     DepthRange,
     DepthRenderCamera,
+    HalfSpace,
     IllustrationProperties,
     LightParameter,
     MakeRenderEngineVtk,
@@ -154,7 +155,9 @@ def add_world(
     if by_hand:
         geometries = plant.GetCollisionGeometriesForBody(table)
         X_WT = RigidTransform([*config.table.centre_W, 0.0])
-        check_on_top(objects, footprint(scene_graph.model_inspector(), geometries, X_WT))
+        inspector = scene_graph.model_inspector()
+        if geometries and not any(isinstance(inspector.GetShape(g), HalfSpace) for g in geometries):
+            check_on_top(objects, footprint(inspector, geometries, X_WT))  # else it has no edge
         if panda.camera_frame is not None:
             X_WC = panda.camera_frame.CalcPoseInWorld(plant.CreateDefaultContext())
             check_in_view(objects, X_WC, config.camera.intrinsics)
