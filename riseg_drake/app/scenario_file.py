@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 import yaml
 from pydrake.common.yaml import yaml_load_typed
 
-from riseg_drake.host.files import MOST_SETTINGS, FileError, MissingFileError, read_text
+from riseg_drake.host.files import MOST_SETTINGS, FileError, MissingFileError, near_name, read_text
 from riseg_drake.host.terminal import one_line
 
 Schema = TypeVar("Schema")
@@ -250,9 +250,6 @@ def _said(node: yaml.Node) -> str:
 
 def _nearest_file(path: Path) -> str:
     """A hint at a file of nearly the same name beside the one that is missing."""
-    try:
-        names = [entry.name for entry in path.parent.iterdir() if entry.suffix in (".yaml", ".yml")]
-    except (OSError, ValueError):
+    if not path.parent.is_dir():
         return f"; nor is the folder {path.parent}"
-    near = difflib.get_close_matches(path.name, names, n=1)
-    return f"; did you mean {path.parent / near[0]}?" if near else ""
+    return near_name(path, (".yaml", ".yml"))

@@ -4,8 +4,10 @@ Everything is read through here, so that a pipe hangs no command, a device fills
 recording does not lead to somebody's other files.
 """
 
+import difflib
 import os
 import stat
+from collections.abc import Sequence
 from pathlib import Path
 
 MOST_TEXT = 64 * 2**20
@@ -20,6 +22,21 @@ class FileError(ValueError):
 
 class MissingFileError(FileError):
     """There is no such file."""
+
+
+def near_name(path: Path, suffixes: Sequence[str] = ()) -> str:
+    """A hint, such as "; did you mean X?", at a name near to the first part of a path that is missing.
+
+    With `suffixes`, only what ends so counts. Empty where nothing is near, or the path is there.
+    """
+    try:
+        while not path.parent.exists() and path.parent != path:
+            path = path.parent
+        names = [entry.name for entry in path.parent.iterdir() if not suffixes or entry.suffix in suffixes]
+    except (OSError, ValueError):
+        return ""
+    near = [] if path.name in names else difflib.get_close_matches(path.name, names, n=1)
+    return f"; did you mean {path.parent / near[0]}?" if near else ""
 
 
 class LeadsOutError(FileError):

@@ -22,6 +22,8 @@ MIN_CLEARANCE = 0.003
 """Room that solutions keep between arm, tool and table, m."""
 OBSERVING_CLEARANCE = 0.02
 """The same where the arm looks at the scene from an angle, m."""
+OBSERVE_HEIGHTS, OBSERVE_PITCHES = {"least": 0.1, "most": 1.5}, {"least": 0.0, "most": 1.2}
+"""m and rad; from how far, and leaning by how much, a scenario may have the arm look."""
 
 READY = np.array([0.0, -0.1, 0.0, -2.4, 0.0, 2.3, 0.0])
 """An elbow-up posture amid the joints' ranges, the flange pointing down and ahead, rad."""

@@ -58,12 +58,12 @@ def _without_hidden(pieces: Sequence[NDArray]) -> list[NDArray]:
     kept = list(pieces)
     for piece in sorted(pieces, key=lambda p: float(np.ptp(p, axis=0).prod())):
         others = [p for p in kept if p is not piece]
-        if others and np.all(np.any([_inside(piece, other) for other in others], axis=0)):
+        if others and np.all(np.any([inside(piece, other) for other in others], axis=0)):
             kept = others
     return kept
 
 
-def _inside(points: NDArray, convex: NDArray) -> NDArray:
+def inside(points: NDArray, convex: NDArray) -> NDArray:
     """Which points [n] lie in a convex polygon."""
     edge = np.roll(convex, -1, axis=0) - convex
     outward = np.column_stack([edge[:, 1], -edge[:, 0]])

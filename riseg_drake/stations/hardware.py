@@ -27,6 +27,7 @@ from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import Immutable
 from riseg_drake.robot.command_stream import CommandParameters
 from riseg_drake.robot.description import PandaDescription
+from riseg_drake.robot.kinematics import OBSERVE_HEIGHTS, OBSERVE_PITCHES
 from riseg_drake.robot.limits import check_start_position
 from riseg_drake.stations.arm_messages import AHEAD
 from riseg_drake.stations.arm_view import add_arm_view
@@ -103,9 +104,9 @@ class HardwareStationConfig:
         default_factory=lambda: [0.5, 0.0], metadata={"sizes": (2,), "least": -1.5, "most": 1.5}
     )
     """Middle of the work area on the table, x and y in W, m; the camera looks at it between pushes."""
-    observe_height: float = field(default=0.5, metadata={"least": 0.1, "most": 1.5})
+    observe_height: float = field(default=0.5, metadata=OBSERVE_HEIGHTS)
     """Distance of the camera from it then, m: its height, where it looks straight down."""
-    observe_pitch: float = field(default=0.0, metadata={"least": 0.0, "most": 1.2})
+    observe_pitch: float = field(default=0.0, metadata=OBSERVE_PITCHES)
     """How far the view leans from straight down then, rad, from the side where the arm has most room."""
     start_position: list[float] = field(default_factory=list, metadata={"sizes": (0, 7)})
     """Joint angles to look from instead, rad, 7; empty: as the lines above say."""

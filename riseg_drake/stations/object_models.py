@@ -17,6 +17,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 from scipy.spatial import ConvexHull, QhullError
 
+from riseg_drake.host.files import near_name
 from riseg_drake.host.model_files import ModelFileError, reading_model
 from riseg_drake.host.terminal import Notice, one_line
 from riseg_drake.robot.description import find_packages, register_models
@@ -32,6 +33,9 @@ HEAVIEST = 20.0
 INERTIA_SHARE = 4.0
 """Of the largest moment of inertia that a body of an object's mass and collision shape can have: the shape may
 be simpler than the body."""
+_UPRIGHT = 0.99
+"""Cosine of the angle, 8 degrees, by which an upright axis may lean."""
+_OWN = "package://riseg_drake_models/"
 _FEW = 5
 """Models that are named."""
 
@@ -58,6 +62,11 @@ class ObjectModel:
     """Its centre of mass p_BBcm [3], m."""
     axes: NDArray
     """Unit vectors in B [k, 3] about which it is a body of revolution: none; one of a can, three of a ball."""
+
+    @property
+    def has_flat_sides(self) -> bool:
+        """Whether, as it stands, it is more than round about the vertical, so that it can lie flush."""
+        return not bool(np.any(np.abs(self.axes @ self.X_WB.rotation().matrix()[2]) > _UPRIGHT))
 
 
 def find_models(folders: str | Sequence[str], names: Sequence[str] = ()) -> list[ObjectModel]:
@@ -98,7 +107,7 @@ def find_model(path_or_url: str) -> ObjectModel:
             raise SceneError(f"model: {len(found)} models in {path}; expected one *.sdf or *.urdf, or a file")
         (path,) = found
     if not path.is_file():
-        raise SceneError(f"model: no file {path}; expected an SDF or URDF model")
+        raise SceneError(f"model: no file {path}; expected an SDF or URDF model{near_name(path)}")
     model = measure(path.parent.name if path.stem == "model" else path.stem, path)
     _tell_without_inertia([model])
     return model
@@ -186,7 +195,13 @@ def resolve(path_or_url: str) -> Path:
         except RuntimeError as error:  # nobody knows where ~ is
             raise SceneError(f"objects: {path_or_url}: {error}") from None
     packages = PackageMap()
-    packages.Add("riseg_drake_models", Path(str(files("riseg_drake.models"))))
+    own = Path(str(files("riseg_drake.models")))
+    packages.Add("riseg_drake_models", own)
+    missing = own / path_or_url.removeprefix(_OWN)
+    if path_or_url.startswith(_OWN) and not missing.exists():
+        raise SceneError(f"objects: {path_or_url} is not there{near_name(missing)}")
+    if not path_or_url.startswith(_OWN):
+        raise SceneError(f"objects: {path_or_url}: no such package; expected {_OWN}...")
     try:
         return Path(packages.ResolveUrl(path_or_url))
     except RuntimeError as error:
@@ -196,7 +211,9 @@ def resolve(path_or_url: str) -> Path:
 def _resolve(folder_or_url: str) -> Path:
     folder = resolve(folder_or_url)
     if not os.path.isdir(folder):
-        raise SceneError(f"objects: {folder} is not a folder; expected one with *.sdf or *.urdf models")
+        raise SceneError(
+            f"objects: {folder} is not a folder; expected one with *.sdf or *.urdf models{near_name(folder)}"
+        )
     return folder
 
 

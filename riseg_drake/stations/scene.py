@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -11,9 +11,10 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from riseg_drake.stations.layouts import Habit, Spot, centred, lay_out
 from riseg_drake.stations.object_models import ObjectModel, SceneError, find_model, find_models
 from riseg_drake.stations.placed_object import PlacedObject
+from riseg_drake.stations.placement import check_apart
 from riseg_drake.stations.settling import lay_pile, settle
 
-__all__ = ["PlacedConfig", "SceneConfig", "draw_scene", "make_scene", "place_scene"]
+__all__ = ["PlacedConfig", "SceneConfig", "check_placed", "draw_scene", "make_scene", "place_scene"]
 
 DROP = 2e-4  # m; how far above its resting height an object starts
 LAYOUTS_OF_A_CHOICE = 5
@@ -67,7 +68,9 @@ class SceneConfig:
     """Fewest objects in a scene; if left out 4 (paper), in a crowd 8, in a pile 5."""
     count_max: int | None = None
     """Most objects in a scene; if left out 6 (paper), in a crowd 12, in a pile 7."""
-    centre_W: list[float] = field(default_factory=lambda: [0.5, 0.0])
+    centre_W: list[float] = field(
+        default_factory=lambda: [0.5, 0.0], metadata={"sizes": (2,), "least": -1.5, "most": 1.5}
+    )
     """Middle of the work area on the table, x and y in W, m."""
     radius: float | None = None
     """No part of an object is further from the middle than this, m; if left out 0.15, packed 0.17, in a pile
@@ -80,25 +83,52 @@ class SceneConfig:
     """Smallest gap otherwise, m."""
     gap_max: float = 0.012
     """Largest gap otherwise, m."""
-    placed: list[PlacedConfig] = field(default_factory=list)
-    """Objects in places of one's own; with any, nothing is drawn."""
+    placed: list[PlacedConfig] | None = None
+    """Objects in places of one's own, at least one; nothing is drawn then."""
+
+
+_DRAWN = tuple(each.name for each in fields(SceneConfig) if each.name not in ("centre_W", "placed"))
+"""Keys that say what is drawn."""
 
 
 def make_scene(config: SceneConfig, rng: np.random.Generator) -> list[PlacedObject]:
     """The objects that are placed, or a drawn scene. Raises SceneError."""
-    return place_scene(config.placed) if config.placed else draw_scene(config, rng)
+    check_placed(config)
+    return draw_scene(config, rng) if config.placed is None else place_scene(config.placed)
+
+
+def check_placed(config: SceneConfig) -> None:
+    """Raise SceneError where a scene is said to be placed and nothing is, or something to be drawn, too."""
+    if config.placed is None:
+        return
+    if not config.placed:
+        raise SceneError("placed: an empty list; expected one object or more, or no `placed`, to draw a scene")
+    own = SceneConfig()
+    drawn = [key for key in _DRAWN if getattr(config, key) != getattr(own, key)]
+    if drawn:
+        raise SceneError(
+            f"{', '.join(drawn)}: of no account where objects are `placed`; leave out the one or the other"
+        )
 
 
 def place_scene(placed: Sequence[PlacedConfig]) -> list[PlacedObject]:
-    """Objects exactly where they are said to be. Raises SceneError."""
+    """Objects exactly where they are said to be. Raises SceneError, also for one in the table or another."""
     objects = []
     for k, item in enumerate(placed):
         if len(item.X_WB) != 6:
             raise SceneError(
                 f"placed[{k}].X_WB: {len(item.X_WB)} numbers; expected x, y, z in m and roll, pitch, yaw in rad"
             )
+        if np.abs(item.X_WB[3:]).max() > 2 * np.pi:
+            raise SceneError(f"placed[{k}].X_WB: {item.X_WB}; roll, pitch, yaw are radians, at most 2 pi")
         X_WB = RigidTransform(RollPitchYaw(item.X_WB[3:]), item.X_WB[:3])
-        objects.append(PlacedObject(find_model(item.model), X_WB))
+        try:
+            model = find_model(item.model)
+        except SceneError as error:
+            said = str(error).removeprefix("model: ").removeprefix("objects: ")
+            raise SceneError(f"placed[{k}].model: {said}") from None
+        objects.append(PlacedObject(model, X_WB))
+    check_apart(objects)
     return objects
 
 
@@ -110,6 +140,12 @@ def draw_scene(config: SceneConfig, rng: np.random.Generator) -> list[PlacedObje
         raise SceneError(
             f"count_min: {kind.count_min} different objects wanted, but {_named(config.objects)} offers "
             f"{len(models)}; add models or ask for fewer"
+        )
+    round_ones = [model.name for model in models if not model.has_flat_sides]
+    if config.layout == "packed" and len(models) - len(round_ones) < min(2, len(models)):
+        raise SceneError(
+            f"layout: packed lays flat sides together, but {_named(round_ones)} are round; "
+            "add things with flat sides, or use layout: spread"
         )
     count = int(rng.integers(kind.count_min, min(kind.count_max, len(models)) + 1))
     restless = ""
@@ -134,7 +170,7 @@ def draw_scene(config: SceneConfig, rng: np.random.Generator) -> list[PlacedObje
             break
     if restless:
         raise SceneError(f"{restless}; model it with z up, standing on a face or on three points or more")
-    raise _no_room(chosen, kind)
+    raise _no_room(chosen, kind, config.layout)
 
 
 def _laid(
@@ -159,9 +195,10 @@ def _reach(placed: Sequence[PlacedObject], centre_W: Sequence[float]) -> float:
     return float(np.linalg.norm(corners - centre_W, axis=1).max())
 
 
-def _no_room(chosen: Sequence[ObjectModel], kind: _Layout) -> SceneError:
+def _no_room(chosen: Sequence[ObjectModel], kind: _Layout, layout: str) -> SceneError:
+    what = "come to rest as a pile" if layout == "pile" else "fit"
     return SceneError(
-        f"{len(chosen)} objects ({', '.join(model.name for model in chosen)}) do not fit within "
+        f"{len(chosen)} objects ({', '.join(model.name for model in chosen)}) do not {what} within "
         f"{kind.radius:g} m of the middle; ask for fewer, smaller ones, or enlarge radius"
     )
 
@@ -177,6 +214,8 @@ def _kind(config: SceneConfig) -> _Layout:
     radius = own.radius if config.radius is None else config.radius
     if not 1 <= low <= high:
         raise SceneError(f"count_min, count_max: {low}, {high}; expected 1 <= min <= max")
+    if config.layout == "pile" and low < 2:
+        raise SceneError(f"count_min, count_max: {low}, {high}; a pile is 2 things or more, one on another")
     if len(config.centre_W) != 2:
         raise SceneError(f"centre_W: {config.centre_W}; expected x and y in metres")
     if radius <= 0:

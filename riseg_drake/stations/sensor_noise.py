@@ -31,37 +31,39 @@ class SensorNoise:
 
     enabled: bool = True
     """False: a perfect sensor, whatever else is said here."""
-    color_std: float = 2.0
+    color_std: float = field(default=2.0, metadata={"least": 0.0, "most": 40.0})
     """Standard deviation of each colour channel, levels of 255."""
-    disparity_std: float = 0.08
+    disparity_std: float = field(default=0.08, metadata={"least": 0.0, "most": 10.0})
     """Standard deviation of the disparity, px."""
-    focal_length: float = 645.0
+    focal_length: float = field(default=645.0, metadata={"least": 10.0, "most": 100000.0})
     """Focal length of the infrared imagers, px."""
-    baseline: float = 0.055
+    baseline: float = field(default=0.055, metadata={"least": 0.001, "most": 10.0})
     """Distance of the infrared imagers, m."""
-    correlation: float = 1.5
+    correlation: float = field(default=1.5, metadata={"least": 0.1, "most": 50.0})
     """Width (one sigma) over which the depth noise is alike, px."""
-    quantum: float = 0.001
+    quantum: float = field(default=0.001, metadata={"least": 0.0, "most": 0.1})
     """Depth is rounded to multiples of this, m; 0: not at all."""
     occlusion_shadow: bool = True
     """Whether depth is missing where the second imager's view is blocked."""
-    edge_step: float = 0.01
+    edge_step: float = field(default=0.01, metadata={"least": 0.0001, "most": 1.0})
     """A depth difference between neighbouring pixels that counts as an edge, m."""
-    edge_dropout: float = 0.5
+    edge_dropout: float = field(default=0.5, metadata={"least": 0.0, "most": 1.0})
     """Share of the pixels at an edge that lose their depth."""
-    flying: float = 0.0
+    flying: float = field(default=0.0, metadata={"least": 0.0, "most": 1.0})
     """Share of those that keep it whose depth lies anywhere between near and far; measured 0.12."""
     smooth: SmoothErrorParameters = field(default_factory=SmoothErrorParameters)
     """The error that is alike over tens of pixels."""
-    dark_level: float = 48.0
+    dark_level: float = field(default=48.0, metadata={"least": 1.0, "most": 255.0})
     """Gray level of 255 below which depth may be missing,"""
-    dark_dropout: float = 0.0
+    dark_dropout: float = field(default=0.0, metadata={"least": 0.0, "most": 1.0})
     """and the share that is, in patches, where it is black; measured 0.2."""
-    grazing_angle: float = 45.0
+    grazing_angle: float = field(default=45.0, metadata={"least": 2.0, "most": 89.0})
     """Angle between line of sight and normal, degrees, above which depth may be missing,"""
-    grazing_dropout: float = 0.0
+    grazing_dropout: float = field(default=0.0, metadata={"least": 0.0, "most": 1.0})
     """and the share that is, in patches, just short of 90 degrees; measured 0.07."""
-    depth_shift: list[int] = field(default_factory=lambda: [0, 0])
+    depth_shift: list[int] = field(
+        default_factory=lambda: [0, 0], metadata={"sizes": (2,), "least": -100, "most": 100}
+    )
     """Whole pixels, right and down, by which depth lies beside colour; measured 1 to 5."""
 
 

@@ -9,6 +9,7 @@ from pydrake.geometry import (
     ColorRenderCamera,
     DepthRange,
     DepthRenderCamera,
+    HalfSpace,
     IllustrationProperties,
     LightParameter,
     MakeRenderEngineVtk,
@@ -24,7 +25,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
-from pydrake.multibody.tree import BodyIndex, Frame, ModelInstanceIndex, PdControllerGains
+from pydrake.multibody.tree import BodyIndex, Frame, ModelInstanceIndex, PdControllerGains, RigidBody
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import Demultiplexer, StateInterpolatorWithDiscreteDerivative
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
@@ -37,11 +38,13 @@ from riseg_drake.robot.description import (
     add_panda,
     register_models,
 )
-from riseg_drake.robot.kinematics import PandaKinematics, observation_posture
+from riseg_drake.robot.kinematics import OBSERVE_HEIGHTS, OBSERVE_PITCHES, PandaKinematics, observation_posture
 from riseg_drake.robot.limits import check_start_position
 from riseg_drake.stations.contact import let_touch, set_contact_model
+from riseg_drake.stations.footprint import footprint
 from riseg_drake.stations.object_models import resolve
 from riseg_drake.stations.placed_object import PlacedObject, add_scene, object_id_table
+from riseg_drake.stations.placement import check_in_view, check_on_top
 from riseg_drake.stations.scene import SceneConfig, make_scene
 from riseg_drake.stations.sleep import Sleep
 from riseg_drake.stations.wrist_camera import CameraConfig, ObjectLabels, WristCamera
@@ -68,9 +71,11 @@ class TableConfig:
 
     url: str = "package://riseg_drake_models/table/table.sdf"
     """A model of one link, its origin in the middle of the top face."""
-    centre_W: list[float] = field(default_factory=lambda: [0.45, 0.0])
+    centre_W: list[float] = field(
+        default_factory=lambda: [0.45, 0.0], metadata={"sizes": (2,), "least": -5.0, "most": 5.0}
+    )
     """Where its middle stands, x and y in W, m."""
-    color: list[float] = field(default_factory=list)
+    color: list[float] = field(default_factory=list, metadata={"sizes": (0, 3), "least": 0.0, "most": 1.0})
     """Red, green, blue of the top, 0 to 1; empty: as the model says (white)."""
     texture: str = ""
     """A PNG or JPEG file, or a `package://` URL of one, laid over the top; empty: none."""
@@ -88,16 +93,16 @@ class SimulatedStationConfig:
     """Lights, shadows and background of the camera's pictures."""
     time_step: float = field(default=0.002, metadata={"least": 0.0005, "most": 0.02})
     """Longest step of the simulation, s; shortened so that a whole number of steps makes a picture."""
-    stiffness: float = 2000.0
+    stiffness: float = field(default=2000.0, metadata={"least": 1.0, "most": 1e6})
     """Proportional gain of every joint's controller, N m / rad."""
-    damping: float = 200.0
+    damping: float = field(default=200.0, metadata={"least": 0.0, "most": 1e5})
     """Derivative gain of every joint's controller, N m s / rad."""
     start_position: list[float] = field(default_factory=list, metadata={"sizes": (0, 7)})
     """Joint angles at the start, rad, 7; empty: looking at the middle of the work area."""
-    observe_height: float = 0.5
+    observe_height: float = field(default=0.5, metadata=OBSERVE_HEIGHTS)
     """Distance of the camera from there at the start, m: its height, where it looks straight down. Unused
     where start_position is given."""
-    observe_pitch: float = 0.0
+    observe_pitch: float = field(default=0.0, metadata=OBSERVE_PITCHES)
     """How far the view leans from straight down at the start, rad (0.785 is 45 degrees), from the side where
     the arm has most room. Unused where start_position is given."""
 
@@ -138,7 +143,8 @@ def add_world(
         let_touch(plant, scene_graph, pushing, rigid=True)
     for instance in (panda.arm, panda.tool):
         plant.set_gravity_enabled(instance, False)
-    _add_table(plant, scene_graph, config.table)
+    table = _add_table(plant, scene_graph, config.table)
+    by_hand = objects is None and config.scene.placed
     if objects is None:
         objects = make_scene(config.scene, np.random.default_rng(seed))
     object_bodies = add_scene(plant, scene_graph, objects)
@@ -146,6 +152,15 @@ def add_world(
     _set_gains(plant, panda.arm, config)
     plant.Finalize()
     plant.SetDefaultPositions(panda.arm, start_position(config))
+    if by_hand:
+        geometries = plant.GetCollisionGeometriesForBody(table)
+        X_WT = RigidTransform([*config.table.centre_W, 0.0])
+        inspector = scene_graph.model_inspector()
+        if geometries and not any(isinstance(inspector.GetShape(g), HalfSpace) for g in geometries):
+            check_on_top(objects, footprint(inspector, geometries, X_WT))  # else it has no edge
+        if panda.camera_frame is not None:
+            X_WC = panda.camera_frame.CalcPoseInWorld(plant.CreateDefaultContext())
+            check_in_view(objects, X_WC, config.camera.intrinsics)
     return SimulatedWorld(plant, scene_graph, panda, list(objects), object_bodies)
 
 
@@ -262,7 +277,8 @@ def _set_gains(plant: MultibodyPlant, arm: ModelInstanceIndex, config: Simulated
                 actuator.set_controller_gains(PdControllerGains(p=config.stiffness, d=config.damping))
 
 
-def _add_table(plant: MultibodyPlant, scene_graph: SceneGraph, config: TableConfig) -> None:
+def _add_table(plant: MultibodyPlant, scene_graph: SceneGraph, config: TableConfig) -> RigidBody:
+    """Add the table with its looks; returns its body."""
     parser = Parser(plant)
     register_models(parser)
     (table,) = parser.AddModels(url=config.url)
@@ -271,7 +287,7 @@ def _add_table(plant: MultibodyPlant, scene_graph: SceneGraph, config: TableConf
     plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform([*config.centre_W, 0.0]))
     let_touch(plant, scene_graph, plant.GetCollisionGeometriesForBody(body), rigid=True)
     if not config.color and not config.texture:
-        return
+        return body
     texture = resolve(config.texture) if config.texture else None
     if texture is not None and not texture.is_file():
         raise ValueError(f"table texture: no file {config.texture}; expected a PNG or JPEG image")
@@ -289,3 +305,4 @@ def _add_table(plant: MultibodyPlant, scene_graph: SceneGraph, config: TableConf
         if texture is not None:
             looks.AddProperty("phong", "diffuse_map", str(texture))
         scene_graph.AssignRole(source, geometry, looks)
+    return body

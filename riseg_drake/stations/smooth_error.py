@@ -9,7 +9,7 @@ It is drawn from a Gaussian process over pixel and pose by random Fourier featur
 same view of the same sensor gives the same error, whenever it is asked for.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -28,15 +28,15 @@ class SmoothErrorParameters:
     Measured on a RealSense in the hand before a desk, see docs/sensing.md.
     """
 
-    disparity_std: float = 0.0
+    disparity_std: float = field(default=0.0, metadata={"least": 0.0, "most": 10.0})
     """Standard deviation of the disparity, px; 0: none; measured 0.2."""
-    width: float = 15.0
+    width: float = field(default=15.0, metadata={"least": 1.0, "most": 1000.0})
     """Over so many pixels it is alike."""
-    flicker: float = 0.5
+    flicker: float = field(default=0.5, metadata={"least": 0.0, "most": 1.0})
     """Share of its variance that is new in every picture."""
-    view_shift: float = 0.005
+    view_shift: float = field(default=0.005, metadata={"least": 0.0001, "most": 10.0})
     """m; the camera's shift after which the rest is another one,"""
-    view_turn: float = 0.009
+    view_turn: float = field(default=0.009, metadata={"least": 0.0001, "most": 6.3})
     """rad; and its turn."""
 
 

@@ -38,10 +38,14 @@ class CameraConfig(CameraMount):
     depth_max: float = field(default=3.0, metadata={"least": 0.0, "most": 20.0})
     """Farthest depth that is measured, m."""
     noise: SensorNoise = field(default_factory=SensorNoise)
-    mount_turn: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    mount_turn: list[float] = field(
+        default_factory=lambda: [0.0, 0.0, 0.0], metadata={"sizes": (3,), "least": -0.5, "most": 0.5}
+    )
     """Rotation vector in C, rad, by which the camera really is turned on the arm: what a hand-eye calibration
     has wrong, a few milliradians at best,"""
-    mount_shift: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    mount_shift: list[float] = field(
+        default_factory=lambda: [0.0, 0.0, 0.0], metadata={"sizes": (3,), "least": -0.1, "most": 0.1}
+    )
     """and by which it is shifted, m: a millimetre or two at best."""
 
     def check(self) -> None:

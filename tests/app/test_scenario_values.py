@@ -1,9 +1,17 @@
 """What a robot cannot do, or nobody should ask of it, is refused before anything moves."""
 
+import dataclasses
+
+import numpy as np
 import pytest
 
 from riseg_drake.app.scenario import BUILT_IN, HARDWARE, Scenario, load_scenario
 from riseg_drake.app.scenario_file import ScenarioError, parse_scenario
+from riseg_drake.stations.hardware import HardwareStationConfig
+from riseg_drake.stations.scene import SceneConfig
+from riseg_drake.stations.sensor_noise import SensorNoise
+from riseg_drake.stations.simulated import SimulatedStationConfig
+from riseg_drake.stations.smooth_error import SmoothErrorParameters
 
 
 def refusal(station, kind="!HardwareStationConfig"):
@@ -105,6 +113,39 @@ def test_the_range_is_that_of_the_robot_that_is_named():
     assert said.startswith("2: station.start_position is 0.3 for joint 6; expected 0.5709 to ")
 
 
-def test_a_simulated_station_is_checked_too():
-    said = refusal("camera: {width: 3}", kind="!SimulatedStationConfig")
-    assert said.startswith("2: station.camera.width is 3; expected 16 to 16384")
+@pytest.mark.parametrize(
+    ("station", "said"),
+    [
+        ("camera: {width: 3}", "camera.width is 3; expected 16 to 16384"),
+        ("observe_pitch: 45", "observe_pitch is 45; expected 0 to 1.2"),
+        ("observe_pitch: -0.785", "observe_pitch is -0.785; expected 0 to 1.2"),
+        ("observe_height: -0.5", "observe_height is -0.5; expected 0.1 to 1.5"),
+        ("camera: {mount_turn: [0.1]}", "camera.mount_turn has 1 numbers; expected 3"),
+        ("camera: {mount_shift: [2, 0, 0]}", "camera.mount_shift is 2; expected -0.1 to 0.1"),
+        (
+            "camera: {noise: {smooth: {disparity_std: -1}}}",
+            "camera.noise.smooth.disparity_std is -1; expected 0",
+        ),
+        ("camera: {noise: {flying: 1.5}}", "camera.noise.flying is 1.5; expected 0 to 1"),
+        ("camera: {noise: {grazing_angle: 1.2}}", "camera.noise.grazing_angle is 1.2; expected 2 to 89"),
+        ("camera: {noise: {depth_shift: [1]}}", "camera.noise.depth_shift has 1 numbers; expected 2"),
+        ("table: {color: [200, 200, 200]}", "table.color is 200; expected 0 to 1"),
+    ],
+)
+def test_a_simulated_station_is_checked_too(station, said):
+    assert refusal(station, kind="!SimulatedStationConfig").startswith(f"2: station.{said}")
+
+
+@pytest.mark.parametrize("schema", [SensorNoise, SmoothErrorParameters])
+def test_every_number_of_the_sensors_errors_has_bounds_around_its_default(schema):
+    for field in dataclasses.fields(schema):
+        values = np.ravel(getattr(schema(), field.name))
+        if field.type is not bool and values.dtype.kind in "if":
+            assert np.all((field.metadata["least"] <= values) & (values <= field.metadata["most"])), field.name
+
+
+@pytest.mark.parametrize("name", ["centre_W", "observe_height", "observe_pitch"])
+def test_a_simulated_arm_looks_from_where_a_real_one_may(name):
+    real = {field.name: field.metadata for field in dataclasses.fields(HardwareStationConfig)}[name]
+    holder = SceneConfig if name == "centre_W" else SimulatedStationConfig
+    assert {field.name: field.metadata for field in dataclasses.fields(holder)}[name] == real

@@ -264,11 +264,11 @@ def test_placed_objects_stand_exactly_where_the_scenario_says(tmp_path):
     write_plain_models(tmp_path)
     placed = [
         PlacedConfig(str(tmp_path / "brick.sdf"), [0.5, 0.1, 0.02, 0.0, 0.0, 0.5]),
-        PlacedConfig(str(tmp_path / "can"), [0.4, -0.1, 0.025, 0.1, 0.2, 0.3]),
+        PlacedConfig(str(tmp_path / "can"), [0.4, -0.1, 0.035, 0.1, 0.2, 0.3]),
     ]
     scene = make_scene(SceneConfig(placed=placed), np.random.default_rng(0))
     assert [item.name for item in scene] == ["brick", "can"]
-    np.testing.assert_array_equal(scene[1].X_WB.translation(), [0.4, -0.1, 0.025])
+    np.testing.assert_array_equal(scene[1].X_WB.translation(), [0.4, -0.1, 0.035])
     # Roll, pitch, yaw are turns about W's x, y, z, one after the other.
     R = (
         RotationMatrix.MakeZRotation(0.3)
@@ -281,15 +281,83 @@ def test_placed_objects_stand_exactly_where_the_scenario_says(tmp_path):
 @pytest.mark.parametrize(
     ("placed", "message"),
     [
-        (PlacedConfig("no/such.sdf"), "no file no/such.sdf"),
+        (PlacedConfig("no/such.sdf"), r"^placed\[0\].model: no file no/such.sdf"),
         (PlacedConfig(HOUSEHOLD[0]), "0 models in"),
         (PlacedConfig(f"{HOUSEHOLD[0]}/box_white", [0.5, 0.0]), "2 numbers; expected x, y, z"),
+        (PlacedConfig(f"{HOUSEHOLD[0]}/box_white", [0.5, 0, 0, 0, 0, 90.0]), "are radians"),
     ],
 )
 def test_a_placed_object_that_cannot_be_says_why(placed, message):
     with pytest.raises(SceneError, match=message) as error:
         make_scene(SceneConfig(placed=[placed]), np.random.default_rng(0))
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"placed": []}, "placed: an empty list; expected one object or more"),
+        ({"count_min": 2}, "count_min: of no account where objects are `placed`"),
+        ({"layout": "pile", "radius": 0.2}, "layout, radius: of no account"),
+        ({"objects": HOUSEHOLD, "names": ["can_tuna"]}, "objects, names: of no account"),
+        ({"gap_max": 0.05, "touch_probability": 1.0}, "touch_probability, gap_max: of no account"),
+    ],
+)
+def test_a_scene_is_drawn_or_placed_and_not_both_or_neither(options, message):
+    config = SceneConfig(**{"placed": [PlacedConfig(f"{HOUSEHOLD[0]}/box_white")], **options})
+    with pytest.raises(SceneError, match=message) as error:
+        make_scene(config, np.random.default_rng(0))
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("counts", [{"count_min": 1, "count_max": 1}, {"count_max": 1}, {"count_min": 1}])
+def test_a_pile_of_one_is_refused_for_what_it_is(counts):
+    with pytest.raises(SceneError, match="a pile is 2 things or more"):
+        draw(0, layout="pile", **counts)
+
+
+def test_a_pile_that_never_rests_is_not_said_to_be_too_large(monkeypatch):
+    monkeypatch.setattr(scene_module, "lay_pile", lambda *_: None)
+    with pytest.raises(SceneError, match=r"2 objects \(.*\) do not come to rest as a pile within 0.2 m"):
+        draw(0, layout="pile", count_min=2, count_max=2)
+
+
+@pytest.mark.parametrize("names", [["bowl_blue", "can_tuna"], ["box_white", "bowl_blue", "can_tuna"]])
+def test_packed_wants_two_things_with_flat_sides(names):
+    with pytest.raises(SceneError, match=r"^layout: packed lays flat sides together, but .*can_tuna are round"):
+        draw(0, layout="packed", objects=HOUSEHOLD, names=names, count_min=2, count_max=2)
+
+
+def test_boxes_and_cans_that_lie_have_flat_sides_and_what_stands_round_has_none():
+    names = ["bowl_blue", "box_white", "can_soda_lying", "can_tuna", "remote"]
+    flat = {model.name: model.has_flat_sides for model in find_models(HOUSEHOLD, names)}
+    assert [name for name in names if flat[name]] == ["box_white", "can_soda_lying", "remote"]
+
+
+@pytest.mark.parametrize(
+    ("find", "wrong", "near"),
+    [
+        (find_models, "package://riseg_drake_models/houshold", "models/household"),
+        (find_models, "package://riseg_drake_models/houshold/box_white", "models/household"),
+        (find_model, f"{HOUSEHOLD[0]}/box_wite", "household/box_white"),
+        (find_models, "{folder}/thngs", "{folder}/things"),
+        (find_model, "{folder}/things/brik.sdf", "{folder}/things/brick.sdf"),
+    ],
+)
+def test_a_misspelt_folder_or_model_is_answered_with_the_nearest_name(tmp_path, find, wrong, near):
+    (tmp_path / "things").mkdir()
+    write_plain_models(tmp_path / "things")
+    with pytest.raises(SceneError) as error:
+        find(wrong.format(folder=tmp_path))
+    said = str(error.value)
+    assert "\n" not in said
+    assert said.endswith(f"{near.format(folder=tmp_path)}?")
+    assert "; did you mean " in said
+
+
+def test_another_package_than_the_models_of_this_one_is_named():
+    with pytest.raises(SceneError, match=r"riseg_drke_models/household: no such package; expected package://"):
+        find_models("package://riseg_drke_models/household")
 
 
 @pytest.mark.renders

@@ -94,7 +94,7 @@ def scenario_of(scenario: Scenario, case: Case) -> Scenario:
     camera.fx, camera.fy = finer * camera.fx, finer * camera.fy
     camera.width, camera.height = case.width, case.height
     scene = station.scene
-    scene.placed, scene.count_min, scene.count_max = [], case.objects, case.objects
+    scene.placed, scene.count_min, scene.count_max = None, case.objects, case.objects
     # The area grows with what lies on it; six have the radius of their layout.
     if case.objects > USUAL.objects:
         scene.layout, scene.radius = "crowd", 0.15 * (case.objects / USUAL.objects) ** 0.5

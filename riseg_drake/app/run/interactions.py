@@ -21,6 +21,7 @@ from riseg_drake.pushing.decision import UNDECIDED, Decision, Ending
 from riseg_drake.pushing.push import NO_PUSH, Push
 from riseg_drake.segmentation.segmentation import Segmentation
 from riseg_drake.segmentation.untouched import untouched_clusters
+from riseg_drake.stations.object_models import SceneError
 from riseg_drake.stations.physics import advance
 from riseg_drake.systems.stage_clock import StageClock
 
@@ -96,7 +97,8 @@ def interactions(
     It ends when the arm is done (a_i = null, or enough pushes were made), or when `longest` seconds have
     passed; `progress.end` and `progress.decision` say which. At wall time also when somebody else has set
     `progress.end`; how things stand then is yielded, too. The truth is that of the simulation if not given.
-    Raises PhysicsError where a simulation cannot go on.
+    Raises PhysicsError where a simulation cannot go on, and SceneError where its camera sees none of its
+    objects at the first look.
     """
     clock.watch(wired.stages)
     simulator = Simulator(wired.diagram)
@@ -117,6 +119,8 @@ def interactions(
             progress.frames += 1
             progress.objects = len(wired.segmentation(context).object_ids)
             book.count(news.frame, is_at_rest=news.phase is ArmPhase.OBSERVE)
+            if progress.frames == 1 and not wall:
+                book.check_sight()
             for listener in listeners:
                 listener(news.frame, context)
             wired.let_sleep(context)
@@ -230,6 +234,16 @@ class _Book:
             _ = truth.labels
         if truth is not None or self._seen is None or self._seen.truth is None:
             self._seen = _Seen(frame, self._wired.segmentation(self._context), truth)
+
+    def check_sight(self) -> None:
+        """Raise SceneError where there are objects and none is in sight: empty masks would be right."""
+        truth = self._seen.truth if self._seen else None
+        if truth is not None and truth.names and not truth.labels.any():
+            names = ", ".join(truth.names.values())
+            raise SceneError(
+                f"the camera sees none of the objects ({names}) at the first look; place them in its view, "
+                "or let start_position, centre_W or X_WC look at them"
+            )
 
     def _count_moved(self, time: float, truth: Truth) -> None:
         """Score what has moved in this interaction. Labels are drawn only where there is such a thing."""

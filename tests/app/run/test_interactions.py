@@ -14,6 +14,7 @@ from riseg_drake.pushing.arm_path import ArmPhase
 from riseg_drake.pushing.decision import UNDECIDED
 from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.segmentation.segmentation import nothing_segmented
+from riseg_drake.stations.object_models import SceneError
 from riseg_drake.systems.stage_clock import StageClock
 
 SIZE = (8, 40)
@@ -121,3 +122,21 @@ def test_a_run_that_is_over_shows_its_end_once():
     assert list(interactions(idle, StageClock(), progress, 0.5, truth=lambda *_: None)) == []
     assert progress.end.startswith("0.5 s were simulated")
     assert idle.ends == [0.5]
+
+
+def first_look(labels, names):
+    book = _Book(Scene(), None, StageClock(), lambda *_: Truth(lambda: labels, {}, names))
+    book.count(frame(0), is_at_rest=True)
+    return book
+
+
+def test_a_first_look_that_shows_none_of_the_objects_ends_it_and_one_that_shows_a_pixel_does_not():
+    names, labels = {1: "toy", 2: "can"}, np.zeros(SIZE, np.uint16)
+    with pytest.raises(SceneError, match=r"^the camera sees none of the objects \(toy, can\)"):
+        first_look(labels, names).check_sight()
+    labels[0, 0] = 2
+    first_look(labels, names).check_sight()
+
+
+def test_a_look_at_a_table_with_nothing_on_it_goes_on():
+    first_look(np.zeros(SIZE, np.uint16), {}).check_sight()
