@@ -57,13 +57,13 @@ def doubts_about_scale(views: Sequence[View], depth_scale: float, limits: Plausi
     usual = "1000 for millimetres, 5000 for TUM, 10000 for tenths of millimetres"
     if not 1 / limits.scale < factor < limits.scale:
         return [
-            f'"depth_scale" {depth_scale:g} (units per metre) puts the table {distance:.2g} m away and makes '
-            f"all there is {factor:.2g} times the size of a usual table scene; right is {usual}"
+            f'"depth_scale" {depth_scale:g} (units per metre) puts the table {_rounded(distance)} m away and '
+            f"makes all there is {_rounded(factor)} times the size of a usual table scene; right is {usual}"
         ]
     if min(abs(depth_scale / unit - 1) for unit in UNITS) > 0.01:
         return [
             f'"depth_scale" {depth_scale:g} (units per metre) is the unit of no camera or data set that is '
-            f"known, and puts the table {distance:.2g} m away; right is {usual}"
+            f"known, and puts the table {_rounded(distance)} m away; right is {usual}"
         ]
     return []
 
@@ -78,3 +78,8 @@ def doubts_about_distance(depths: Sequence[NDArray[np.float32]]) -> list[str]:
         f"the median depth is {np.median(unlikely):.3g} m, which is unlikely; "
         'is "depth_scale" (units per metre) right?'
     ]
+
+
+def _rounded(number: float) -> str:
+    """To two digits, and no power of ten where a person would write none."""
+    return f"{float(f'{number:.2g}'):g}"
