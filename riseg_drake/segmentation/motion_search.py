@@ -91,7 +91,8 @@ class SearchProblem:
         area, each = self.compared.keyframe.area, {}
         for part in self.divisions:
             for p in np.flatnonzero(np.bincount(part, area) >= self.pixels_min):
-                each[(part == p).tobytes()] = part == p
+                body = part == p
+                each[body.tobytes()] = body
         return np.array([each[key] for key in sorted(each)], bool).reshape(-1, len(area))
 
     @property

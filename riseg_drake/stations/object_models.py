@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import Convex, Mesh, SceneGraph, Shape
 from pydrake.math import RigidTransform
-from pydrake.multibody.parsing import PackageMap, Parser
+from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 from scipy.spatial import ConvexHull, QhullError
@@ -194,18 +194,12 @@ def resolve(path_or_url: str) -> Path:
             return Path(path_or_url).expanduser()
         except RuntimeError as error:  # nobody knows where ~ is
             raise SceneError(f"objects: {path_or_url}: {error}") from None
-    packages = PackageMap()
-    own = Path(str(files("riseg_drake.models")))
-    packages.Add("riseg_drake_models", own)
-    missing = own / path_or_url.removeprefix(_OWN)
-    if path_or_url.startswith(_OWN) and not missing.exists():
-        raise SceneError(f"objects: {path_or_url} is not there{near_name(missing)}")
     if not path_or_url.startswith(_OWN):
         raise SceneError(f"objects: {path_or_url}: no such package; expected {_OWN}...")
-    try:
-        return Path(packages.ResolveUrl(path_or_url))
-    except RuntimeError as error:
-        raise SceneError(f"objects: {' '.join(str(error).split())}") from error
+    path = Path(str(files("riseg_drake.models"))) / path_or_url.removeprefix(_OWN)
+    if not path.exists():
+        raise SceneError(f"objects: {path_or_url} is not there{near_name(path)}")
+    return path
 
 
 def _resolve(folder_or_url: str) -> Path:
