@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import MakeRenderEngineVtk
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder
 
 from riseg_drake.geometry.camera import pixel_grid
 from riseg_drake.stations.placed_object import object_id_table
+from riseg_drake.stations.render_engine import make_render_engine
 from riseg_drake.stations.simulated import RENDERER, SimulatedStationConfig, add_world, ideal_camera
 from riseg_drake.stations.wrist_camera import CameraConfig, measured_images
 
@@ -48,7 +48,7 @@ class EmulatedCamera:
         self._seed = seed
         builder = DiagramBuilder()
         world = add_world(builder, config, seed, config.time_step)
-        world.scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(config.renderer))
+        world.scene_graph.AddRenderer(RENDERER, make_render_engine(config.renderer))
         self._plant = world.plant
         self._sensor = builder.AddSystem(ideal_camera(world.plant, world.panda.camera_frame, self._camera))
         builder.Connect(world.scene_graph.get_query_output_port(), self._sensor.query_object_input_port())

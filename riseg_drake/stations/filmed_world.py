@@ -9,7 +9,6 @@ from pydrake.geometry import (
     ColorRenderCamera,
     DepthRange,
     DepthRenderCamera,
-    MakeRenderEngineVtk,
     RenderCameraCore,
 )
 from pydrake.math import RigidTransform, RotationMatrix
@@ -18,6 +17,7 @@ from pydrake.systems.sensors import CameraInfo
 
 from riseg_drake.geometry.rgbd import sanitize_depth
 from riseg_drake.stations.placed_object import PlacedObject, object_id_table
+from riseg_drake.stations.render_engine import make_render_engine
 from riseg_drake.stations.simulated import CLIPPING, RENDERER, SimulatedStationConfig, add_world
 from riseg_drake.stations.wrist_camera import CameraConfig, measured_images
 
@@ -34,7 +34,7 @@ class FilmedWorld:
         config = SimulatedStationConfig(camera=camera, start_position=ARM_ASIDE)
         builder = DiagramBuilder()
         self._world = add_world(builder, config, seed, config.time_step, objects)
-        self._world.scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(config.renderer))
+        self._world.scene_graph.AddRenderer(RENDERER, make_render_engine(config.renderer))
         self._context = builder.Build().CreateDefaultContext()
         info = CameraInfo(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
         core = RenderCameraCore(RENDERER, info, ClippingRange(*CLIPPING), RigidTransform())

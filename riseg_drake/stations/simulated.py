@@ -12,7 +12,6 @@ from pydrake.geometry import (
     HalfSpace,
     IllustrationProperties,
     LightParameter,
-    MakeRenderEngineVtk,
     Meshcat,
     MeshcatVisualizer,
     PerceptionProperties,
@@ -45,6 +44,7 @@ from riseg_drake.stations.footprint import footprint
 from riseg_drake.stations.object_models import resolve
 from riseg_drake.stations.placed_object import PlacedObject, add_scene, object_id_table
 from riseg_drake.stations.placement import check_in_view, check_on_top
+from riseg_drake.stations.render_engine import make_render_engine
 from riseg_drake.stations.scene import SceneConfig, make_scene
 from riseg_drake.stations.sleep import Sleep
 from riseg_drake.stations.wrist_camera import CameraConfig, ObjectLabels, WristCamera
@@ -221,7 +221,7 @@ class SimulatedStation(Diagram):
         """Asked once a picture, what lies still costs next to nothing."""
 
         self._wire_arm(builder, panda.arm, step)
-        scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(config.renderer))
+        scene_graph.AddRenderer(RENDERER, make_render_engine(config.renderer))
         self._wire_camera(builder, panda.camera_frame, config.camera, seed)
         builder.ExportOutput(plant.get_body_poses_output_port(), "cheat.body_poses")
         if meshcat is not None:

@@ -11,7 +11,6 @@ from pydrake.geometry import (
     DepthRange,
     DepthRenderCamera,
     GeometryInstance,
-    MakeRenderEngineVtk,
     PerceptionProperties,
     RenderCameraCore,
     RenderEngineVtkParams,
@@ -25,6 +24,7 @@ from pydrake.systems.sensors import CameraInfo
 from riseg_drake.app.doctor.finding import Finding
 from riseg_drake.app.graphics import NoGraphicsError, require_graphics
 from riseg_drake.kernels.contraction import contract
+from riseg_drake.stations.render_engine import make_render_engine
 
 CORES = 2
 """One for the segmentation, one for the commands of a real arm beside it."""
@@ -51,7 +51,7 @@ def rendering() -> Finding:
 def _depth_of_a_wall() -> float:
     """What a depth camera sees in the middle of its image, m."""
     scene = SceneGraph()
-    scene.AddRenderer("renderer", MakeRenderEngineVtk(RenderEngineVtkParams()))
+    scene.AddRenderer("renderer", make_render_engine(RenderEngineVtkParams()))
     X_WP = RigidTransform(np.array([0.0, 0.0, DISTANCE + 0.05]))
     wall = GeometryInstance(X_WP, Box(2, 2, 0.1), "wall")
     look = PerceptionProperties()

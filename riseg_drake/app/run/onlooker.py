@@ -6,7 +6,6 @@ from pydrake.geometry import (
     ClippingRange,
     ColorRenderCamera,
     LightParameter,
-    MakeRenderEngineVtk,
     RenderCameraCore,
     RenderEngineVtkParams,
 )
@@ -15,6 +14,7 @@ from pydrake.systems.framework import Context
 from pydrake.systems.sensors import CameraInfo
 
 from riseg_drake.stations.filmed_world import looking_at
+from riseg_drake.stations.render_engine import make_render_engine
 from riseg_drake.stations.simulated import CLIPPING, SimulatedStation
 
 RENDERER = "onlooker"
@@ -36,7 +36,7 @@ class Onlooker:
     def __init__(self, station: SimulatedStation, width: int, height: int):
         """Pictures of so many pixels."""
         self._scene_graph = station.scene_graph
-        self._scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(_light()))
+        self._scene_graph.AddRenderer(RENDERER, make_render_engine(_light()))
         info = CameraInfo(width, height, FIELD_OF_VIEW)
         core = RenderCameraCore(RENDERER, info, ClippingRange(*CLIPPING), RigidTransform())
         self._camera = ColorRenderCamera(core)
