@@ -241,6 +241,11 @@ def command_line() -> argparse.ArgumentParser:
         help="frame of that robot: x right, y down, z ahead in the image (camera)",
     )
     add_source(segment)
+    segment.add_argument(
+        "--overlay",
+        action="store_true",
+        help="also write each picture of the video as a PNG, without the bar of time, to DIR/overlay (no)",
+    )
     add_export(segment)
     add_rerun(segment)
     segment.add_argument(

@@ -73,6 +73,8 @@ class SegmentRequest:
     """The frame of a bag's transforms in which camera poses are given."""
     overwrite: bool = False
     """Whether an earlier segmentation is removed."""
+    overlay: bool = False
+    """Whether every picture of the video is a file of its own, too."""
     export: tuple[str, ...] = ()
     """Formats of other tools."""
     export_frames: tuple[int, ...] = ()
@@ -148,7 +150,9 @@ def segment_command(request: SegmentRequest, console: Console) -> None:
     exports, timeline = Exports(output, request.export, request.export_frames), Timeline(request.rerun, output)
     clock, result = StageClock(), SegmentResult()
     with (
-        SegmentFolder(output, reader.rate, about, overwrite=request.overwrite) as folder,
+        SegmentFolder(
+            output, reader.rate, about, overlay=request.overlay, overwrite=request.overwrite
+        ) as folder,
         _state_of(folder, result, clock),
         exporting(exports, folder.note),
         timeline.opened(_recording_name(request.recording), view.kinematics) as log,

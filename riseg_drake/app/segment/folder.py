@@ -4,6 +4,7 @@
     mask/                   L_t of every frame, 16 bit PNG, named as the colour image it belongs to
     untouched.png           of the last frame what has not moved yet, as clusters of depth: guessed, and no ids
     overlay.mp4             every frame with its objects tinted and numbered, the time and a bar of it
+    overlay/                the same, without the time, as PNG, where that was asked for
     report.html             what was run, what was seen before and after each change, scores, doubts and times
     scores.csv              the ten figures of every frame with a true label
     export/, rerun.rrd      the same in the formats of other tools, where that was asked for
@@ -34,6 +35,7 @@ from riseg_drake.pictures.video import VideoWriter, with_time
 from riseg_drake.recording.whole_file import GrowingText, write_png, write_text
 
 MASKS = "mask"
+OVERLAY = "overlay"
 UNTOUCHED = "untouched.png"
 VIDEO = "overlay.mp4"
 SCORES = "scores.csv"
@@ -41,26 +43,38 @@ COMMAND = "segment"
 LONGEST_NAME = 50
 """Characters of a mask's name: as many bytes as any file system takes, whatever they are."""
 _UNFINISHED_VIDEO = ".overlay.unfinished.mp4"
-PARTS = "|".join(map(re.escape, (MASKS, UNTOUCHED, VIDEO, SCORES, REPORT, EXPORT, FILE, _UNFINISHED_VIDEO)))
+PARTS = "|".join(
+    map(re.escape, (MASKS, OVERLAY, UNTOUCHED, VIDEO, SCORES, REPORT, EXPORT, FILE, _UNFINISHED_VIDEO))
+)
 """What a segmentation puts into its folder, beside the summary."""
 
 
 class SegmentFolder:
     """Writes masks, video and scores as they come, into a folder of its own; see OutputFolder.
 
-    The video has `rate` frames a second. Use it in a `with` block. Raises OutputError if the folder holds
+    The video has `rate` frames a second; with `overlay` its pictures are files, too. Use it in a `with` block. Raises OutputError if the folder holds
     anything else, where it cannot be written, or the disk is full.
     """
 
-    def __init__(self, folder: Path, rate: float, about: Mapping[str, Any], *, overwrite: bool = False):
+    def __init__(
+        self,
+        folder: Path,
+        rate: float,
+        about: Mapping[str, Any],
+        *,
+        overlay: bool = False,
+        overwrite: bool = False,
+    ):
         self.path = folder
-        self._rate = rate
+        self._rate, self._overlay = rate, overlay
         self._video: VideoWriter | None = None
         self._scores: GrowingText | None = None
         self._names: set[str] = set()
         self._folder = OutputFolder(folder, COMMAND, PARTS, {**about, "state": "running"}, overwrite=overwrite)
         with self._folder.writing():
             (folder / MASKS).mkdir(exist_ok=True)
+            if overlay:
+                (folder / OVERLAY).mkdir(exist_ok=True)
 
     def write(
         self,
@@ -84,7 +98,10 @@ class SegmentFolder:
             write_png(self.path / MASKS / file, mask.astype(np.uint16))
             if scores is not None:
                 self._write_scores(file, scores)
-            self._show(with_time(draw_masks(color, mask, confidence=confidence), time, share))
+            picture = draw_masks(color, mask, confidence=confidence)
+            if self._overlay:
+                write_png(self.path / OVERLAY / file, picture)
+            self._show(with_time(picture, time, share))
 
     def write_untouched(self, clusters: NDArray[np.uint16]) -> None:
         """Write what the last frame shows that has not moved yet, [H, W]."""

@@ -58,6 +58,20 @@ def test_every_frame_gets_a_mask_and_a_place_in_the_video_and_a_score(recording)
     assert summary["scores_last"]["obj_gt"] == 2
 
 
+def test_pictures_of_the_video_are_files_where_that_is_asked_for(recording):
+    output, _ = segment(recording)
+    assert not (output / "overlay").exists()
+    output, _ = segment(recording, "--overlay")
+    pictures = sorted((output / "overlay").iterdir())
+    assert [p.name for p in pictures] == sorted(masks(output))
+    color = cv2.imread(str(recording / "rgb" / "000007.png"))
+    shown, mask = cv2.imread(str(pictures[-1])), masks(output)["000007.png"]
+    # As the camera saw it, but for what is tinted, and the outline around that.
+    beside = cv2.dilate((mask > 0).astype(np.uint8), np.ones((9, 9))) == 0
+    assert np.array_equal(shown[beside], color[beside])
+    assert np.mean((shown != color).any(2)[mask > 0]) > 0.9
+
+
 @pytest.mark.renders
 def test_without_poses_the_camera_stands_still_and_the_masks_are_the_same(recording):
     with_poses = masks(segment(recording)[0])
