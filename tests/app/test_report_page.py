@@ -96,6 +96,14 @@ def test_the_least_sure_object_comes_first_and_is_marked():
     assert [each.object_id for each in found_objects([1, 2, 3], {2: 0.9, 3: 0.1})] == [3, 2, 1]
 
 
+def test_what_not_decided_means_is_said_where_something_is_not():
+    words = "was seen in motion alone"
+    assert words not in made()[0]
+    page, _ = made(objects=found_objects([3, 5], {3: 0.5}))
+    assert page.count("<span>not decided</span>") == 1
+    assert words in page
+
+
 def test_a_run_that_saw_nothing_has_a_page_too():
     page, _ = made(views=[], moments=[], objects=[], tables=[])
     assert "No object was found." in page

@@ -52,8 +52,8 @@ PARTS = "|".join(
 class SegmentFolder:
     """Writes masks, video and scores as they come, into a folder of its own; see OutputFolder.
 
-    The video has `rate` frames a second; with `overlay` its pictures are files, too. Use it in a `with` block. Raises OutputError if the folder holds
-    anything else, where it cannot be written, or the disk is full.
+    The video has `rate` frames a second; with `overlay` its pictures are files, too. Use it in a `with` block.
+    Raises OutputError if the folder holds anything else, where it cannot be written, or the disk is full.
     """
 
     def __init__(
