@@ -80,13 +80,7 @@ def find_action(
     # What has never moved comes before what is in doubt; alone before with others; what lies on something else
     # before both, as it has moved with it.
     all_found = replace(table, segmented=table.segmented | (doubtful > 0), doubtful=None)
-    on_top = raised(
-        table,
-        doubtful,
-        parameters.to_segment.minimum_area,
-        parameters.validity.d_push,
-        parameters.levels,
-    )
+    on_top = raised(table, doubtful, parameters.to_segment.minimum_area, parameters.levels)
     stages = chain(
         ((unmoved, all_found, True), (unmoved, all_found, False)),
         ((upper, above, True) for upper, above in on_top),

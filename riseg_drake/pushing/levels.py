@@ -22,6 +22,9 @@ class LevelsParameters:
     """m; the least step of height: what the tip needs to meet the upper thing, and to pass over the lower."""
     over: float = 0.004
     """m; the level lies so much above what the tip is to pass over, whose depth errs."""
+    friction: float = 0.5
+    """Between things and what they stand on: dry cardboard, plastics and wood have 0.2 to 0.5. What is pushed
+    higher than half its width by this tilts and falls back, or falls over, where it should slide."""
 
 
 _APART = 3
@@ -32,7 +35,6 @@ def raised(
     table: TableMap,
     things: NDArray[np.int_],
     minimum_area: float,
-    d_push: float,
     parameters: LevelsParameters,
 ) -> Iterator[tuple[NDArray[np.bool_], TableMap]]:
     """For each thing that lies on another, by all that is seen, its upper part and the map above that level.
@@ -41,7 +43,6 @@ def raised(
         table: the scene.
         things: [rows, columns], ids of what may be several things, 0 elsewhere.
         minimum_area: m^2, of the upper part and of the lower: what is smaller is no object.
-        d_push: how far a push goes, m.
         parameters: see there.
 
     Yields:
@@ -50,10 +51,11 @@ def raised(
     """
     for a in np.unique(things[things > 0]):
         thing = things == a
-        # Should it be one thing, it may fall over: pushed at its top, once it has gone as far as it is wide.
-        if _width(thing, table) < 2 * d_push:
-            continue
+        # Should it be one thing, such as a bottle with its cap, it is to slide all the same.
+        slides = _width(thing, table) / 2 / parameters.friction
         for level in _levels(thing, table, minimum_area, parameters):
+            if level > slides:
+                break
             standing = table.objects & (table.height > level)
             upper, lower = thing & standing, thing & ~standing
             if table.cell_area * min(np.count_nonzero(upper), np.count_nonzero(lower)) >= minimum_area:

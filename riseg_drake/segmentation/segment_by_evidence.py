@@ -44,7 +44,7 @@ from riseg_drake.segmentation.occasions import (
     leaves_keyframe,
     share_in_view,
 )
-from riseg_drake.segmentation.partition import margins
+from riseg_drake.segmentation.partition import as_tested, margins
 from riseg_drake.segmentation.propagation import UNKNOWN
 from riseg_drake.segmentation.rest import is_still
 from riseg_drake.segmentation.segmentation import Segmentation
@@ -228,6 +228,7 @@ def _carried(
     if deciding and seen is not None:
         bond = belief.with_evidence(seen.evidence, parameters.belief).bond
         margin = margins(belief.keyframe, bond, bodies.body, parameters.belief.partition)
+        margin = as_tested(margin, now.margin, moves)
     # What was decided in motion is looked at once more when it rests.
     decided = now.decided or (deciding and now.still_since is not None)
     moved = deciding and len(bodies.motions_K) > 1

@@ -8,6 +8,7 @@ from riseg_drake.segmentation.observation import ObservationParameters
 from riseg_drake.segmentation.partition import (
     PartitionParameters,
     apart,
+    as_tested,
     margins,
     motions_of_parts,
     partition,
@@ -187,6 +188,12 @@ def test_parts_do_not_depend_on_which_end_is_first(mirrored):
     part = partition(Row(), bond[::-1] if mirrored else bond, PartitionParameters())
     sizes = [np.count_nonzero(part == p) for p in part]
     assert sizes == ([3, 3, 3, 2, 2] if mirrored else [2, 2, 3, 3, 3])
+
+
+def test_only_what_moved_can_become_surer_and_anything_less_sure():
+    before = {1: 1.0, 2: 1.0, 3: 4.0, 5: 2.0}
+    now = as_tested({1: 1.5, 2: 1.5, 3: 0.5, 4: 3.0}, before, {2})
+    assert now == {1: 1.0, 2: 1.5, 3: 0.5, 4: 3.0}
 
 
 @pytest.mark.parametrize(("least", "margin"), [(10, 0.5), (11, 8.0)])
