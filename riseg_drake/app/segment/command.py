@@ -21,6 +21,7 @@ from riseg_drake.app.run.command import peak_memory_mb
 from riseg_drake.app.scenario import Scenario, load_scenario
 from riseg_drake.app.segment.doubts import frames_with, recording_doubts
 from riseg_drake.app.segment.folder import VIDEO, SegmentFolder
+from riseg_drake.app.segment.notes import ToldNotes
 from riseg_drake.app.segment.recorded_view import RecordedView, recorded_view
 from riseg_drake.app.segment.replay import Replay
 from riseg_drake.app.segment.report import Album
@@ -29,7 +30,6 @@ from riseg_drake.app.timelines import Timeline, moment_of
 from riseg_drake.app.work_state import end_noted
 from riseg_drake.evaluation.scores import FIGURES, Scores, score
 from riseg_drake.host.files import MOST_SETTINGS, FileError, check_inside, read_text
-from riseg_drake.host.terminal import one_line
 from riseg_drake.recording import layout
 from riseg_drake.recording.layout import LeftOut, RecordedFrame, RecordingError
 from riseg_drake.recording.source import RecordedSource, SourceOptions
@@ -39,8 +39,6 @@ from riseg_drake.segmentation.untouched import untouched_clusters
 from riseg_drake.systems.stage_clock import StageClock
 from riseg_drake.timeline.log import TimelineLog
 
-MOST_LINES = 10
-"""More notes than this are counted on the terminal; the summary has them all."""
 MOST_TIMES = 10_000
 """Calls of each stage whose time is kept: a recording may be longer than memory."""
 
@@ -182,7 +180,7 @@ def _segment(
 ) -> None:
     """Put every frame through Alg. 2 and write what comes of it."""
     clock.watch(replay.stages)
-    told = _Told(console)
+    told = ToldNotes(console)
     told.tell(view.warnings)
     with Progress(
         TextColumn("frames"),
@@ -238,27 +236,6 @@ def _take(
     result.album.look(frame, segmentation)
     result.object_ids, result.confidence = segmentation.object_ids, segmentation.confidence
     return True
-
-
-class _Told:
-    """Tells every note once, and no more than a person can read."""
-
-    def __init__(self, console: Console):
-        self._console = console
-        self._told: set[str] = set()
-
-    def tell(self, notes: list[str]) -> None:
-        """Say what was not said yet."""
-        for note in notes:
-            if note in self._told:
-                continue
-            self._told.add(note)
-            if len(self._told) <= MOST_LINES:
-                self._console.print(
-                    one_line(note), style="yellow", markup=False, highlight=False, soft_wrap=True
-                )
-            elif len(self._told) == MOST_LINES + 1:
-                self._console.print("more of this kind is in the summary", style="yellow")
 
 
 def _parameters(request: SegmentRequest) -> tuple[Scenario, int]:
