@@ -10,7 +10,6 @@ from pydrake.geometry import (
     DepthRange,
     DepthRenderCamera,
     LightParameter,
-    MakeRenderEngineVtk,
     RenderCameraCore,
     RenderEngineVtkParams,
 )
@@ -22,6 +21,7 @@ from pydrake.systems.sensors import CameraInfo
 
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import Frame, sanitize_depth
+from riseg_drake.stations.render_engine import make_render_engine
 
 INTRINSICS = Intrinsics(640, 480, 616.285, 615.778, 317.0, 239.0)
 LOOKING_DOWN = RotationMatrix(np.diag([1.0, -1.0, -1.0]))
@@ -70,7 +70,7 @@ class RenderedBodies:
         lights = [LightParameter(type="directional", direction=[0.3, 0.4, -1], frame="world", intensity=0.8)]
         scene_graph.AddRenderer(
             "vtk",
-            MakeRenderEngineVtk(RenderEngineVtkParams(lights=lights)),
+            make_render_engine(RenderEngineVtkParams(lights=lights)),
         )
         table = "<box><size>2 2 0.1</size></box>"
         sdf = _body_sdf("table", table, None, "0 0 -0.05 0 0 0", static=True)

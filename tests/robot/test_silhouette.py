@@ -5,7 +5,6 @@ from pydrake.geometry import (
     ClippingRange,
     DepthRange,
     DepthRenderCamera,
-    MakeRenderEngineVtk,
     Mesh,
     RenderCameraCore,
     RenderEngineVtkParams,
@@ -20,6 +19,7 @@ from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.robot.description import PandaDescription, add_panda
 from riseg_drake.robot.kinematics import READY, PandaKinematics, observe_pose, tip_pointing_down
 from riseg_drake.robot.silhouette import NEAR, RobotSilhouette, UnknownShapeError, _grown, hull_corners
+from riseg_drake.stations.render_engine import make_render_engine
 
 D415 = Intrinsics(640, 480, 616.285, 615.778, 301.418, 232.864)
 D405 = Intrinsics(640, 480, 433.0, 433.0, 319.5, 239.5)
@@ -42,7 +42,7 @@ def renderer_of_robot(X_WC=None, tool="bar", camera=D415):
     plant, scene_graph = builder.plant(), builder.scene_graph()
     frame = add_panda(plant, PandaDescription(tool=tool), X_WC).camera_frame
     plant.Finalize()
-    scene_graph.AddRenderer("vtk", MakeRenderEngineVtk(RenderEngineVtkParams()))
+    scene_graph.AddRenderer("vtk", make_render_engine(RenderEngineVtkParams()))
     k = camera
     core = RenderCameraCore(
         "vtk",

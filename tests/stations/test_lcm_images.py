@@ -5,7 +5,7 @@ import cv2
 import numpy as np
 import pytest
 from drake import lcmt_image, lcmt_image_array
-from pydrake.geometry import MakeRenderEngineVtk, RenderEngineVtkParams
+from pydrake.geometry import RenderEngineVtkParams
 from pydrake.lcm import DrakeLcm
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.analysis import Simulator
@@ -21,6 +21,7 @@ from riseg_drake.stations.lcm_images import (
     encode_image,
     encode_images,
 )
+from riseg_drake.stations.render_engine import make_render_engine
 
 H, W = 48, 84
 V, U = np.mgrid[:H, :W]
@@ -197,9 +198,7 @@ def test_images_of_two_sizes_are_refused():
 def test_a_camera_that_drake_simulates_is_read(do_compress):
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.01)
-    scene_graph.AddRenderer(
-        "r", MakeRenderEngineVtk(RenderEngineVtkParams(default_clear_color=[0.2, 0.4, 0.8]))
-    )
+    scene_graph.AddRenderer("r", make_render_engine(RenderEngineVtkParams(default_clear_color=[0.2, 0.4, 0.8])))
     plant.Finalize()
     lcm = DrakeLcm("memq://")
     config = CameraConfig(

@@ -8,7 +8,6 @@ from pydrake.geometry import (
     ColorRenderCamera,
     DepthRange,
     DepthRenderCamera,
-    MakeRenderEngineVtk,
     RenderCameraCore,
     RenderEngineVtkParams,
 )
@@ -23,6 +22,7 @@ from riseg_drake.stations.footprint import Footprint, separation, travel
 from riseg_drake.stations.layouts import lay_out
 from riseg_drake.stations.object_models import SceneError, find_model, find_models
 from riseg_drake.stations.placed_object import PlacedObject, add_scene, object_id_table
+from riseg_drake.stations.render_engine import make_render_engine
 from riseg_drake.stations.scene import PlacedConfig, SceneConfig, draw_scene, make_scene
 from riseg_drake.stations.settling import SettlingTable, is_pile, settle
 from tests.stations.resting_layouts import KINDS, lying, packed
@@ -173,7 +173,7 @@ def test_object_ids_count_the_bodies_in_the_order_of_the_scene():
 def test_every_object_shows_in_the_label_image_of_a_camera_half_a_metre_up(scenes):
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.002)
-    scene_graph.AddRenderer("vtk", MakeRenderEngineVtk(RenderEngineVtkParams()))
+    scene_graph.AddRenderer("vtk", make_render_engine(RenderEngineVtkParams()))
     bodies = add_scene(plant, scene_graph, scenes[0])
     plant.Finalize()
     core = RenderCameraCore(
