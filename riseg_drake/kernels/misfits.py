@@ -28,7 +28,7 @@ def _stood(
 @compiled(
     "UniTuple(float64[::1], 3)(float32[:, ::1], float32[::1], float32[::1], intp[::1], intp, float32[:, ::1],"
     "float32[::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], float64, float64,"
-    "float64, float64, float64, float64, float64)"
+    "float64, float64, float64, float64, float64, float64)"
 )
 def misfits(
     pixel: NDArray[np.float32],
@@ -45,6 +45,7 @@ def misfits(
     depth_noise: float,
     depth_error: float,
     certainty: float,
+    shadow: float,
     per_depth: float,
     most: float,
     expected: float,
@@ -72,6 +73,7 @@ def misfits(
         depth_noise: of the difference of two depths at 1 m, m.
         depth_error: share of depth by which it errs besides.
         certainty: 1 / variance of the factor, in the measure of a superpixel's squared residuals.
+        shadow: what any factor costs at most, in the same measure.
         per_depth: what a squared residual of depth counts beside one of gray.
         most: squared residuals count no more than that: beyond, they are no noise.
         expected: what a point counts that cannot be compared, or is covered.
@@ -109,9 +111,12 @@ def misfits(
     # The likeliest factor, by least squares, where the light seems to have changed; it costs once.
     factor, of_factor = np.ones(count), np.full(count, np.inf)
     for p in range(count):
-        if of_gray[p] > 0.5 * known[p]:
-            factor[p] = (before_after[p] + certainty) / (before_before[p] + certainty)
-            of_factor[p] = certainty * (factor[p] - 1) ** 2
+        if of_gray[p] > 0.5 * known[p] and before_before[p] > 0:
+            factor[p] = before_after[p] / before_before[p]
+            of_factor[p] = shadow
+            if certainty * (factor[p] - 1) ** 2 < shadow:
+                factor[p] = (before_after[p] + certainty) / (before_before[p] + certainty)
+                of_factor[p] = certainty * (factor[p] - 1) ** 2
     for n in range(len(gray)):
         p = owner[n]
         if of_factor[p] < np.inf and not np.isnan(after[n]):

@@ -41,6 +41,8 @@ class LikelihoodParameters:
     """The same where nothing moves: shading stays what it was."""
     light_view: float = 0.2
     """So much more of it from another view, where gloss shows other lights."""
+    shadow: float = 2.0
+    """Nats that any change of light costs a superpixel: what a shadow falls on keeps its pattern."""
     correlated_gray: float = CORRELATED_GRAY / 2
     """Errors of gray are alike in so many points, of which every second pixel is one; they count as one."""
     correlated_depth: float = CORRELATED_DEPTH / 2
@@ -200,6 +202,7 @@ def _misfit(
         float(np.sqrt(2)) * compared.depth_noise,
         compared.depth_error,
         parameters.correlated_gray / light**2,
+        2 * parameters.correlated_gray * parameters.shadow,
         parameters.correlated_gray / parameters.correlated_depth,
         parameters.residual_max,
         EXPECTED,

@@ -10,6 +10,8 @@ SIGMA = 3.0
 PIECE = np.repeat([0, 1], 400)
 CERTAINTY = 2400.0
 """6 / 0.05^2: a factor of 0.95 or 1.05 costs 6 squared residuals."""
+NO_SHADOW = np.inf
+"""Factors cost what shading says, however large."""
 MOST, EXPECTED, PER_DEPTH = 9.0, 2.0, 0.25
 NEARER = 0.01
 """m; what is so much in front of a point covers it."""
@@ -40,12 +42,14 @@ def noise(seed: int) -> np.ndarray:
     return np.random.default_rng(seed).normal(0, SIGMA, len(PIECE)).astype(np.float32)
 
 
-def costs(before: np.ndarray, after: np.ndarray, certainty: float = CERTAINTY) -> np.ndarray:
+def costs(
+    before: np.ndarray, after: np.ndarray, certainty: float = CERTAINTY, shadow: float = NO_SHADOW
+) -> np.ndarray:
     """Of the gray values [2], where all pixels are seen again at their places."""
     per_variance = np.full(len(before), 1 / SIGMA**2, np.float32)
     total, lost, covered = misfits(
         pixels(), before, per_variance, PIECE, 2, ONTO_ITSELF, LEVEL, image(after), *UNKNOWN,
-        0.003, 0.0, certainty, PER_DEPTH, MOST, EXPECTED, NEARER,
+        0.003, 0.0, certainty, shadow, PER_DEPTH, MOST, EXPECTED, NEARER,
     )  # fmt: skip
     np.testing.assert_array_equal([lost, covered], 0)
     return total - np.bincount(PIECE)
@@ -67,6 +71,22 @@ def test_a_piece_in_another_light_costs_what_noise_does_and_once_the_price_of_th
     assert cost[1] == pytest.approx(of_noise[1], rel=0.02)
 
 
+@pytest.mark.parametrize("light", [0.2, 0.5, 1.8])
+def test_a_shadow_that_comes_or_goes_costs_the_same_however_dark_it_is(light: float) -> None:
+    before, e = pattern(0), noise(1)
+    cost = costs(before, np.where(PIECE == 0, light, 1).astype(np.float32) * before + e, shadow=50.0)
+    of_noise = np.bincount(PIECE, np.minimum((e / SIGMA) ** 2, MOST))
+    # CERTAINTY x 0.2^2 would be 96.
+    assert cost[0] == pytest.approx(of_noise[0] / max(light, 1) ** 2 + 50, rel=0.02)
+    assert cost[1] == pytest.approx(of_noise[1], rel=0.02)
+
+
+def test_a_change_of_shading_that_is_likelier_than_a_shadow_costs_no_more_than_without_shadows() -> None:
+    before, e = pattern(0), noise(1)
+    after = np.float32(0.9) * before + e
+    np.testing.assert_array_equal(costs(before, after, shadow=50.0), costs(before, after))
+
+
 def test_the_factor_is_the_likeliest_one() -> None:
     # One pixel that went from 100 to 90: (90 - 100 f)^2 + c (f - 1)^2 is least at f = (9000 + c) / (10000 + c).
     before, ones = np.full(800, 100, np.float32), np.ones(800, np.float32)
@@ -74,7 +94,7 @@ def test_the_factor_is_the_likeliest_one() -> None:
     after[0] = 90
     total, _, _ = misfits(
         pixels(), before, ones, np.arange(800), 800, ONTO_ITSELF, LEVEL, image(after), *UNKNOWN,
-        0.003, 0.0, 1e4, PER_DEPTH, 1e4, EXPECTED, NEARER,
+        0.003, 0.0, 1e4, NO_SHADOW, PER_DEPTH, 1e4, EXPECTED, NEARER,
     )  # fmt: skip
     assert total[0] - 1 == pytest.approx((90 - 95) ** 2 + 1e4 * 0.05**2)
     np.testing.assert_array_equal(total[1:], 1)
@@ -90,7 +110,7 @@ def test_what_was_not_found_counts_as_expected_and_says_nothing_about_the_rest()
     after[5:8] = np.nan  # rows 4 to 7 cannot be read between pixels
     total, lost, covered = misfits(
         pixels(), before, np.full(800, 1 / SIGMA**2, np.float32), PIECE, 2, ONTO_ITSELF, LEVEL, after, *UNKNOWN,
-        0.003, 0.0, CERTAINTY, PER_DEPTH, MOST, EXPECTED, NEARER,
+        0.003, 0.0, CERTAINTY, NO_SHADOW, PER_DEPTH, MOST, EXPECTED, NEARER,
     )  # fmt: skip
     np.testing.assert_array_equal([lost, covered], [[160, 0], [0, 0]])
     assert total[0] == pytest.approx(160 * EXPECTED + 240 * 2 + CERTAINTY * 0.25, rel=0.1)
@@ -106,7 +126,7 @@ def test_depth_costs_its_squared_residual_less_what_is_right(nearer: float, erro
     total, _, _ = misfits(
         pixels(), before, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, LEVEL, image(before), depth,
         ONTO_ITSELF, depth,
-        0.004, error, CERTAINTY, PER_DEPTH, MOST, EXPECTED, NEARER,
+        0.004, error, CERTAINTY, NO_SHADOW, PER_DEPTH, MOST, EXPECTED, NEARER,
     )  # fmt: skip
     squared = nearer**2 / ((0.004 * 0.25) ** 2 + (error * 0.5) ** 2)
     np.testing.assert_allclose(total / 400, 1 + PER_DEPTH * (min(squared, MOST) - 1), rtol=1e-3)
@@ -120,7 +140,7 @@ def test_a_point_that_sinks_by_half_of_that_is_not_covered_but_wrong() -> None:
     _, _, covered = misfits(
         pixels(), before, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, sinks, image(before), depth,
         ONTO_ITSELF, depth,
-        0.003, 0.0, CERTAINTY, PER_DEPTH, MOST, EXPECTED, NEARER,
+        0.003, 0.0, CERTAINTY, NO_SHADOW, PER_DEPTH, MOST, EXPECTED, NEARER,
     )  # fmt: skip
     # (-0.001 u + 0.0201) / 2 < -0.005 from u = 31 on: nine of 40 columns, in ten rows of each piece.
     np.testing.assert_array_equal(covered, [400 - 90, 400 - 90])
@@ -137,7 +157,7 @@ def test_a_point_behind_something_is_covered_and_counts_as_expected_whatever_is_
         pixels(), before, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, LEVEL,
         image(np.where(np.arange(800) < 120, 0, before)), depth,
         ONTO_ITSELF, depth,
-        0.003, 0.0, CERTAINTY, PER_DEPTH, MOST, EXPECTED, NEARER,
+        0.003, 0.0, CERTAINTY, NO_SHADOW, PER_DEPTH, MOST, EXPECTED, NEARER,
     )  # fmt: skip
     np.testing.assert_array_equal([lost, covered], [[0, 0], [120, 0]])
     right = 1 - PER_DEPTH
@@ -152,7 +172,7 @@ def test_what_came_there_since_covers_nothing(before: float, stood: bool) -> Non
     depth = np.full((21, 41), 0.45, np.float32)
     _, _, covered = misfits(
         pixels(), values, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, LEVEL, image(values), depth,
-        ONTO_ITSELF, depth_0, 0.003, 0.0, CERTAINTY, PER_DEPTH, MOST, EXPECTED, NEARER,
+        ONTO_ITSELF, depth_0, 0.003, 0.0, CERTAINTY, NO_SHADOW, PER_DEPTH, MOST, EXPECTED, NEARER,
     )  # fmt: skip
     np.testing.assert_array_equal(covered, [400 * stood, 400 * stood])
 
@@ -174,7 +194,7 @@ def test_under_any_motion_it_is_what_numpy_and_opencv_find() -> None:
     M = np.array([[1.02, 0.03, -2, 1.2], [-0.02, 0.98, 3, -0.8], [1e-4, -1e-4, 1, 0.004]], np.float32)
     total, lost, covered = misfits(
         pixel, gray, per_variance, owner, 12, M, LEVEL, gray_1, depth_1, back, depth_0.astype(np.float32),
-        0.003, 0.002, CERTAINTY, PER_DEPTH, MOST, EXPECTED, 0.05,
+        0.003, 0.002, CERTAINTY, NO_SHADOW, PER_DEPTH, MOST, EXPECTED, 0.05,
     )  # fmt: skip
 
     a, b, c = M @ pixel

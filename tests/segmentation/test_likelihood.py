@@ -64,7 +64,21 @@ def test_light_has_one_price_a_superpixel(plate: tuple[Keyframe, Frame]) -> None
     # Depth's residual is 0 and its share of a pixel's cost 3 / 14.
     expected = (132 - 120 * f) ** 2 / 8 / f**2 + c * (f - 1) ** 2 / points + 1 - 3 / 14
     # In the old light it would be 18 a pixel, of which 9 count: for the smallest superpixels that is less.
-    np.testing.assert_allclose(costs(keyframe, brighter), np.minimum(expected, 9 + 1 - 3 / 14), rtol=0.02)
+    found = costs(keyframe, brighter, shadow=np.inf)
+    np.testing.assert_allclose(found, np.minimum(expected, 9 + 1 - 3 / 14), rtol=0.02)
+
+
+@pytest.mark.parametrize("gray", [30, 60, 240])
+def test_a_shadow_costs_a_superpixel_two_nats_whatever_it_darkens(
+    plate: tuple[Keyframe, Frame], gray: int
+) -> None:
+    keyframe, frame = plate
+    other_light = replace(frame, color=np.full_like(frame.color, gray))
+    points = np.bincount(keyframe.owner, minlength=keyframe.count)
+    points = points[points > 0]
+    # 2 nats are 2 x 2 x 3 squared residuals of gray, as 3 points count as one.
+    expected = np.minimum(12 / points, 9) + 1 - 3 / 14
+    np.testing.assert_allclose(costs(keyframe, other_light), expected, rtol=1e-3)
 
 
 @pytest.mark.parametrize("measured", [1 / 1.05, 1 / 1.025, 1.0, 1 / 0.975, 1 / 0.95, 0.9])
@@ -207,7 +221,7 @@ def test_light_is_freer_the_farther_the_view_is_another_one(
     brighter = replace(frame, color=np.full_like(frame.color, 132))
     compared = Comparison(keyframe, brighter, DEPTH_NOISE, view_error=0.0)
     vars(compared)["another_view"] = another
-    misfit = motion_costs(compared, STILL, LikelihoodParameters()).misfit[0]
+    misfit = motion_costs(compared, STILL, LikelihoodParameters(shadow=np.inf)).misfit[0]
     points = np.bincount(keyframe.owner, minlength=keyframe.count)
     c = 3 / (0.02**2 + (0.2 * another) ** 2)
     w = points[points > 0]

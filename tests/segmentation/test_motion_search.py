@@ -9,7 +9,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from riseg_drake.segmentation import motion_search
 from riseg_drake.segmentation.belief import BeliefParameters
 from riseg_drake.segmentation.comparison import Comparison
-from riseg_drake.segmentation.likelihood import motion_costs, unexplained_parts
+from riseg_drake.segmentation.likelihood import LikelihoodParameters, motion_costs, unexplained_parts
 from riseg_drake.segmentation.missing_motion import Missed, missing_motion
 from riseg_drake.segmentation.motion_search import (
     MotionSearchParameters,
@@ -20,7 +20,12 @@ from riseg_drake.segmentation.motion_search import (
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.next_keyframe import first_belief
 from riseg_drake.segmentation.noise import MeasurementNoise
-from riseg_drake.segmentation.observation import ObservationParameters, observe
+from riseg_drake.segmentation.observation import (
+    ObservationParameters,
+    bond_evidence,
+    motion_posterior,
+    observe,
+)
 from riseg_drake.segmentation.slides import slides
 from tests.segmentation.drawn_scene import (
     Blank,
@@ -230,7 +235,16 @@ def test_boxes_get_their_motions_and_borders_inside_them_hold():
         assert np.mean(motions == np.bincount(motions).argmax()) > 0.97
     a, b = keyframe.borders.T
     apart = truth[a] != truth[b]
-    assert np.median(seen.evidence[apart]) < -1.5
+    # Between two boxes most borders say all that they can: each side is four nats surer of its own motion.
+    parameters = ObservationParameters()
+    own = [np.bincount(seen.motion[truth == k]).argmax() for k in (1, 2, 3)]
+    for k, other in ((1, 2), (2, 3)):
+        between = (np.minimum(truth[a], truth[b]) == k) & (np.maximum(truth[a], truth[b]) == other)
+        nats = np.full((len(seen.share), 2), LikelihoodParameters().superpixel_max)
+        nats[own[k - 1], 0] = nats[own[other - 1], 1] = 0.0
+        q = motion_posterior(nats, seen.share, parameters.outlier)
+        most = bond_evidence(q, seen.share, np.array([[0, 1]]), parameters.stays, parameters.along)
+        assert np.median(seen.evidence[between]) == pytest.approx(most[0], abs=0.1)
     # Standing still together, as the second does, says log 1 / 0.8, moving together log 1 / 0.2, less what
     # superpixels leave open.
     shared = [np.median(seen.evidence[~apart & (truth[a] == k)]) for k in (1, 2, 3)]
