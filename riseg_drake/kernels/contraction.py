@@ -8,13 +8,25 @@ from numpy.typing import NDArray
 from riseg_drake.kernels.compiled import compiled
 
 
-@compiled("intp[::1](intp, intp[:, ::1], float64[::1], float64[:, ::1], float64)")
+@compiled("void(float64[::1], intp[::1], float64[::1])")
+def _find_lowest(cost: NDArray[np.float64], ends: NDArray[np.intp], lowest: NDArray[np.float64]) -> None:
+    """The least cost [Q] of each question's answers [G]."""
+    start = 0
+    for q in range(len(ends)):
+        lowest[q] = np.inf
+        for g in range(start, ends[q]):
+            lowest[q] = min(lowest[q], cost[g])
+        start = ends[q]
+
+
+@compiled("intp[::1](intp, intp[:, ::1], float64[::1], float64[:, ::1], intp[::1], float64[::1])")
 def contract(
     nodes: int,
     edges: NDArray[np.intp],
     weight: NDArray[np.float64],
     cost: NDArray[np.float64],
-    free: float,
+    ends: NDArray[np.intp],
+    free: NDArray[np.float64],
 ) -> NDArray[np.intp]:
     """For each node [nodes] one that stands for its part.
 
@@ -22,8 +34,9 @@ def contract(
         nodes: how many.
         edges: [M, 2], pairs of nodes, each once.
         weight: [M], log-odds that both ends are one; renewed in place.
-        cost: [nodes, G], how badly each of G motions explains each node, nats; renewed in place.
-        free: nats that it may cost two parts to have one motion.
+        cost: [nodes, G], how badly each of G answers explains each node, nats; renewed in place.
+        ends: [Q], rising: the answers before each belong to one question, of which a part has one answer.
+        free: [Q], nats that it may cost two parts to have one answer to each of them.
     """
     # Edge e has two ends, 2 e and 2 e + 1; `at` says at which part, and each part has a list of its ends.
     at, after = edges.copy().ravel(), np.full(2 * len(weight), -1)
@@ -31,9 +44,9 @@ def contract(
     size, parent = np.ones(nodes, np.intp), np.arange(nodes)
     # Edges of which one end has grown, or may be asked again once it does.
     gone, again = np.zeros(len(weight), np.bool_), np.zeros(len(weight), np.bool_)
-    beside, lowest = np.full(nodes, -1), np.zeros(nodes)
+    beside, lowest = np.full(nodes, -1), np.zeros((nodes, len(ends)))
     for a in range(nodes):
-        lowest[a] = cost[a].min()
+        _find_lowest(cost[a], ends, lowest[a])
     # What a pair of parts gains: at first its bond, with sizes 0, and what remains of it once its motions were
     # looked at, with the sizes of both: a part whose size is the same is the same part.
     queue = [(0.0, 0, 0, 0, 0, 0)]
@@ -53,10 +66,13 @@ def contract(
         if size_a != size[a] or size_b != size[b]:
             if size_a == 0 and weight[e] != -negative:
                 continue  # their bond has changed
-            shared = cost[a, 0] + cost[b, 0]
-            for g in range(1, cost.shape[1]):
-                shared = min(shared, cost[a, g] + cost[b, g])
-            lost = shared - lowest[a] - lowest[b] - free
+            lost, start = 0.0, 0
+            for q in range(len(ends)):
+                shared = np.inf
+                for g in range(start, ends[q]):
+                    shared = min(shared, cost[a, g] + cost[b, g])
+                lost += max(0.0, shared - lowest[a, q] - lowest[b, q] - free[q])
+                start = ends[q]
             if lost > 0:
                 if weight[e] > lost:
                     heappush(queue, (lost - weight[e], a, b, e, size[a], size[b]))
@@ -69,7 +85,7 @@ def contract(
         size[a] += size[b]
         for g in range(cost.shape[1]):
             cost[a, g] += cost[b, g]
-        lowest[a] = cost[a].min()
+        _find_lowest(cost[a], ends, lowest[a])
         gone[e] = True
         # The edges of b become those of a, or join those that a has.
         end, first[a], degree[a] = first[a], -1, 0

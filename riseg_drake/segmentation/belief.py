@@ -23,6 +23,10 @@ class BeliefParameters:
     once: bool = True
     """What goes along with its neighbour because they touch does so at every push: that both move alike counts
     once, as the most that a push has said for it."""
+    told: bool = True
+    """Remember which bodies motion has told apart, wherever they are (`told_apart`)."""
+    arrivals: bool = True
+    """What stands where nothing stood before has moved, though no motion was found (`arrivals`)."""
     most: float = 12.0
     """Evidence of a border adds up to no more than that, nats, so that it can be revised."""
     weaker: list[float] = field(default_factory=lambda: [0.5, 1.0, 1.5])
@@ -43,6 +47,8 @@ class Belief(Immutable):
     body: NDArray[np.intp]
     """[N], ids; 0 where nothing has moved yet."""
     next_id: int
+    told: NDArray[np.float64]
+    """[I, I], nats that speak against two ids' being one body (`told_apart`)."""
     part: NDArray[np.intp]
     """[N], 0.., which superpixels are one body by all that is known: what has not moved, too."""
     shown: NDArray[np.float64]

@@ -14,6 +14,7 @@ from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.observation import Observation, ObservationParameters, evidence_of_parts
 from riseg_drake.segmentation.partition import apart, motions_of_parts, partition, with_ids
 from riseg_drake.segmentation.propagation import UNKNOWN, carry_labels, draw_labels
+from riseg_drake.segmentation.told_apart import identity_costs, moving_apart, with_lost
 
 _BLIND = 0.004
 """Share of a picture that has no depth, and is not the robot, from which that matters."""
@@ -30,6 +31,8 @@ class Bodies(Immutable):
     motions_K: NDArray[np.float64]
     """[G, 4, 4], seen from the keyframe's camera; the first is standing still."""
     next_id: int
+    told: NDArray[np.float64]
+    """[I, I], nats that speak against two ids' being one body (`told_apart`)."""
 
     def seen_from(self, X_NK: NDArray[np.float64]) -> "Bodies":
         """The same with motions as a camera N sees them, in which the keyframe's has the pose X_NK [4, 4]."""
@@ -39,7 +42,7 @@ class Bodies(Immutable):
 def standing(belief: Belief) -> Bodies:
     """The bodies where nothing has moved since the keyframe."""
     still = np.zeros(belief.keyframe.count, np.intp)
-    return Bodies(belief.body, still, np.eye(4)[None], belief.next_id)
+    return Bodies(belief.body, still, np.eye(4)[None], belief.next_id, belief.told)
 
 
 def bodies_of(
@@ -55,10 +58,13 @@ def bodies_of(
     motion explains falls apart for it.
     """
     keyframe = belief.keyframe
+    motion = motions_of_parts(belief.body, seen.nats, parameters.partition)[belief.body]
+    told = moving_apart(belief.told, belief.body, motion)
+    known = identity_costs(told, belief.body, keyframe.area)
 
     def parts_by(evidence: NDArray[np.float64]) -> NDArray[np.intp]:
         bond = belief.with_evidence(evidence, parameters).bond
-        return partition(keyframe, bond, parameters.partition, seen.nats)
+        return partition(keyframe, bond, parameters.partition, known, seen.nats)
 
     part = parts_by(seen.evidence)
     if keyframe.across.any():
@@ -74,7 +80,10 @@ def bodies_of(
     # What was found in motion and is gone leaves no gap in the numbers.
     next_id = max(belief.next_id, 0 if before is None else int(before.body.max(initial=0)) + 1)
     body, next_id = with_ids(part, moved, keyframe.area, previous, next_id)
-    return seen, Bodies(body, motion[part], seen.motions_K, next_id)
+    free = parameters.partition.rigid_min
+    told = with_lost(told, belief.body, body, next_id, seen.nats, keyframe.area, free)
+    told = told if parameters.told else np.zeros_like(told)
+    return seen, Bodies(body, motion[part], seen.motions_K, next_id, told)
 
 
 def carry_bodies(
@@ -141,4 +150,4 @@ def rebased(then: Bodies, now: Bodies, old: Keyframe, following: Belief) -> Bodi
         motion[following.body == a] = len(motions)
         since = then.motions_K[k] @ inverse(now.motions_K[now.motion[mine][0]])
         motions.append(seen_from(X_NO, since))
-    return Bodies(following.body, motion, np.array(motions), following.next_id)
+    return Bodies(following.body, motion, np.array(motions), following.next_id, following.told)

@@ -77,11 +77,11 @@ def carried_evidence(
     known = (from_a >= 0) & (from_b >= 0)
     same_border, place = _same_borders(old.keyframe, from_a, from_b)
     was, prior, alike = (np.append(each, 0.0)[place] for each in (old.evidence, old.prior, old.alike))
-    # Of a border that there was what it showed, of any other what all borders of its bodies did. A gap that
-    # was seen once is remembered when it has closed.
+    # Of a border that there was what it showed, of any other what all borders of its bodies did. Of what the
+    # pictures say half is the last one's: a gap is remembered when it has closed, and noise does not add up.
     between, gap, alike_between = _between_bodies(old, new, body)
     was, prior = np.where(same_border, was, between), np.where(same_border, prior, gap)
-    remembered = was + np.minimum(prior - new_prior, 0)
+    remembered = was + (prior - new_prior) / 2
     hidden = ((from_a < 0) ^ (from_b < 0)) & ~origin.in_sight
     # What has parted is two, and so is what may lie on the other and goes along with it; what was told apart by
     # less is as much two as all that was seen between them says.

@@ -5,6 +5,8 @@ multicuts, ICCV 2015): the two parts with the strongest bond are joined, again a
 for joining. Nobody says how many parts there are.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,18 +17,26 @@ def multicut(
     nodes: int,
     edges: NDArray[np.intp],
     weight: NDArray[np.float64],
-    nats: NDArray[np.float64] | None = None,
-    free: float = 0.0,
+    questions: Sequence[tuple[NDArray[np.float64], float]] = (),
 ) -> NDArray[np.intp]:
     """The part 0.. of each node [nodes], for edges [M, 2] with the log-odds [M] that their two ends are one.
 
-    With `nats` [G, nodes], how badly each of G motions explains each node, two parts that no motion explains
-    together as well as each is by its own lose what that costs, but for the first `free` nats.
+    Of each of the `questions` a part has one answer: given how badly each of G answers explains each node
+    [G, nodes], in nats, two parts that none explains together as well as each is by its own lose what that
+    costs, but for the first so many nats.
     """
     pair = np.sort(edges, axis=1) @ [nodes, 1]
     each, which = np.unique(pair, return_inverse=True)
-    cost = np.zeros((nodes, 1)) if nats is None or len(nats) < 2 else np.array(nats.T, np.float64, order="C")
+    asked = [(nats, free) for nats, free in questions if len(nats) > 1]
+    cost = np.concatenate([nats.T for nats, _ in asked] or [np.zeros((nodes, 0))], axis=1)
     once = np.stack(np.divmod(each, nodes), axis=1)
     bond = np.asarray(np.bincount(which, weight, len(each)), np.float64)
-    stands_for = contract(nodes, once, bond, cost, free)
+    stands_for = contract(
+        nodes,
+        once,
+        bond,
+        np.ascontiguousarray(cost, np.float64),
+        np.cumsum([len(nats) for nats, _ in asked], dtype=np.intp),
+        np.array([free for _, free in asked], np.float64),
+    )
     return np.unique(stands_for, return_inverse=True)[1]

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.segmentation.above_table import AboveTable
+from riseg_drake.segmentation.arrivals import have_come, with_arrivals
 from riseg_drake.segmentation.belief import Belief, BeliefParameters
 from riseg_drake.segmentation.bodies import Bodies, carry_superpixels
 from riseg_drake.segmentation.border_prior import border_prior
@@ -17,6 +18,7 @@ from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.observation import Observation
 from riseg_drake.segmentation.partition import partition
 from riseg_drake.segmentation.propagation import UNKNOWN
+from riseg_drake.segmentation.told_apart import identity_costs
 
 
 def first_belief(
@@ -33,6 +35,7 @@ def first_belief(
         alike=np.zeros(len(keyframe.borders)),
         body=np.zeros(keyframe.count, np.intp),
         next_id=1,
+        told=np.zeros((1, 1)),
         part=part,
         shown=freedoms_shown(keyframe.edges, frame.gray, part, keyframe.borders),
         finer=_finer(keyframe, prior, parameters),
@@ -71,17 +74,27 @@ def next_belief(
     in_sight = were_in_sight(old, new, source, bodies.motion[source], bodies.motions_K)
     origin = Origin(source, body, in_sight)
     evidence, alike = carried_evidence(replace(belief, body=bodies.body), new, prior, origin, parameters.inside)
-    part = partition(new, prior + evidence, parameters.partition)
+    told = identity_costs(bodies.told, body, new.area)
+    part = partition(new, prior + evidence, parameters.partition, told)
+    body, next_id = with_arrivals(
+        completed(body, known, part, new.area),
+        part,
+        have_come(old, new) & ~known & parameters.arrivals,
+        new.area,
+        parameters.partition.area_min * new.pixels_per_metre**2,
+        bodies.next_id,
+    )
     return Belief(
         keyframe=new,
         prior=prior,
         evidence=evidence,
         alike=alike,
-        body=completed(body, known, part, new.area),
-        next_id=bodies.next_id,
+        body=body,
+        next_id=next_id,
+        told=np.pad(bodies.told, (0, next_id - bodies.next_id)),
         part=part,
         shown=freedoms_shown(new.edges, frame.gray, part, new.borders),
-        finer=_finer(new, prior + evidence, parameters),
+        finer=_finer(new, prior + evidence, parameters, told),
     )
 
 
@@ -95,8 +108,13 @@ def completed(
     return np.where(known | (body > 0), body, most[part])
 
 
-def _finer(keyframe: Keyframe, bond: NDArray[np.float64], parameters: BeliefParameters) -> NDArray[np.intp]:
-    parts = [partition(keyframe, bond - by, parameters.partition) for by in parameters.weaker]
+def _finer(
+    keyframe: Keyframe,
+    bond: NDArray[np.float64],
+    parameters: BeliefParameters,
+    known: NDArray[np.float64] | None = None,
+) -> NDArray[np.intp]:
+    parts = [partition(keyframe, bond - by, parameters.partition, known) for by in parameters.weaker]
     return np.array(parts, np.intp).reshape(-1, keyframe.count)
 
 

@@ -1,7 +1,7 @@
 """Which superpixels are one body, which bodies have moved, and what the next best answer would cost."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,15 +38,19 @@ def partition(
     keyframe: Keyframe,
     bond: NDArray[np.float64],
     parameters: PartitionParameters,
+    known: NDArray[np.float64] | None = None,
     nats: NDArray[np.float64] | None = None,
 ) -> NDArray[np.intp]:
     """The part 0.. of each superpixel [N] for the log-odds of each border [M]; no part is too small.
 
-    With `nats` [G, N], how badly each motion explains each superpixel: a body is rigid, and what saw it move
-    may be far from the border that is in question.
+    With what is `known` of B bodies [B, N], nats that it costs each superpixel to be one with them
+    (`told_apart`). With `nats` [G, N], how badly each motion explains each superpixel: a body is rigid, and
+    what saw it move may be far from the border that is in question.
     """
     weight = bond * keyframe.length
-    part = multicut(keyframe.count, keyframe.borders, weight, nats, parameters.rigid_min)
+    asked = ((known, 0.0), (nats, parameters.rigid_min))
+    questions = [(costs, free) for costs, free in asked if costs is not None]
+    part = multicut(keyframe.count, keyframe.borders, weight, questions)
     if nats is not None and len(nats) > 1:
         part = redrawn(part, keyframe.borders, weight, nats, parameters)
     joins = ~keyframe.across | (weight > 0)
@@ -170,42 +174,54 @@ def with_ids(
     return id_of[part], max(next_id, int(id_of.max(initial=0)) + 1)
 
 
+@dataclass(frozen=True)
+class Margins:
+    """By how many nats a border the best partition is better than the next one, for each id."""
+
+    whole: Mapping[int, float] = field(default_factory=dict)
+    """Than one in which it is two: how much weaker every bond may be before it falls apart."""
+    alone: Mapping[int, float] = field(default_factory=dict)
+    """Than one in which it is part of another that moved: how much stronger every bond may be."""
+
+    @property
+    def least(self) -> dict[int, float]:
+        """Than any other."""
+        return {a: min(by, self.alone[a]) for a, by in self.whole.items()}
+
+
 def margins(
     keyframe: Keyframe,
     bond: NDArray[np.float64],
     body: NDArray[np.intp],
     parameters: PartitionParameters,
-) -> dict[int, float]:
-    """For each id in `body` [N], by how many nats a border its best partition is better than the next one.
-
-    A body that falls in two when every bond is a little weaker, or merges with another that moved when every
-    bond is a little stronger, is in doubt.
-    """
+    known: NDArray[np.float64] | None = None,
+) -> Margins:
+    """How sure each id in `body` [N] is, by bonds [M] and what is `known`, as `partition` has them."""
     ids = [int(a) for a in np.unique(body[body > 0])]
-    margin = dict.fromkeys(ids, 2 * parameters.margins[-1])
+    whole = dict.fromkeys(ids, 2 * parameters.margins[-1])
+    alone = dict(whole)
+    area_min = parameters.area_min * keyframe.pixels_per_metre**2
     for by in reversed(parameters.margins):
-        weaker = partition(keyframe, bond - by, parameters)
-        stronger = partition(keyframe, bond + by, parameters)
+        weaker = partition(keyframe, bond - by, parameters, known)
+        stronger = partition(keyframe, bond + by, parameters, known)
         for a in ids:
             mine = body == a
-            shares = np.bincount(weaker[mine], keyframe.area[mine])
-            falls_apart = np.count_nonzero(shares >= parameters.area_min * keyframe.pixels_per_metre**2) > 1
+            if np.count_nonzero(np.bincount(weaker[mine], keyframe.area[mine]) >= area_min) > 1:
+                whole[a] = by
             own = np.bincount(stronger[mine], keyframe.area[mine]).argmax()
             others = (stronger == own) & ~mine & (body > 0)
-            merges = keyframe.area[others].sum() >= parameters.area_min * keyframe.pixels_per_metre**2
-            if falls_apart or merges:
-                margin[a] = by
-    return margin
+            if keyframe.area[others].sum() >= area_min:
+                alone[a] = by
+    return Margins(whole, alone)
 
 
-def as_tested(
-    margin: Mapping[int, float], before: Mapping[int, float], moved: Collection[int]
-) -> dict[int, float]:
-    """The margins of a rest, where those of ids that have not moved since the rest `before` do not rise.
+def as_tested(now: Margins, before: Margins, moved: Collection[int]) -> Margins:
+    """The margins of a rest, where ids that have not moved since the rest `before` are as whole as they were.
 
-    What stood still was not put to the test, though its new superpixels may seem to hold together better.
+    What stood still was not put to the test, though its new superpixels may hold together better, or worse.
     """
-    return {a: m if a in moved else min(m, before.get(a, m)) for a, m in margin.items()}
+    whole = {a: by if a in moved else before.whole.get(a, by) for a, by in now.whole.items()}
+    return replace(now, whole=whole)
 
 
 def _without_small(

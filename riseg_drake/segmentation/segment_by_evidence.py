@@ -48,6 +48,7 @@ from riseg_drake.segmentation.partition import as_tested, margins
 from riseg_drake.segmentation.propagation import UNKNOWN
 from riseg_drake.segmentation.rest import is_still
 from riseg_drake.segmentation.segmentation import Segmentation
+from riseg_drake.segmentation.told_apart import identity_costs
 
 
 def segment_by_evidence(
@@ -224,16 +225,17 @@ def _carried(
         bodies={**kept, frame.sequence: bodies},
         poses={**poses, frame.sequence: frame.X_WC},
     )
-    margin = now.margin
+    sure = now.margins
     if deciding and seen is not None:
         bond = belief.with_evidence(seen.evidence, parameters.belief).bond
-        margin = margins(belief.keyframe, bond, bodies.body, parameters.belief.partition)
-        margin = as_tested(margin, now.margin, moves)
+        told = identity_costs(bodies.told, bodies.body, belief.keyframe.area)
+        sure = margins(belief.keyframe, bond, bodies.body, parameters.belief.partition, told)
+        sure = as_tested(sure, now.margins, moves)
     # What was decided in motion is looked at once more when it rests.
     decided = now.decided or (deciding and now.still_since is not None)
     moved = deciding and len(bodies.motions_K) > 1
     if not above.mask.any() or not (moved or leaves):
-        return replace(now, margin=margin, decided=decided)
+        return replace(now, margins=sure, decided=decided)
     memory: Memory = {}
     if parameters.memory:
         label_K = belief.keyframe.image_of(bodies.body.astype(np.uint16))
@@ -244,7 +246,7 @@ def _carried(
     since = {s: rebased(b, bodies, belief.keyframe, following) for s, b in seen_so_far.items()}
     return replace(
         now,
-        margin=margin,
+        margins=sure,
         belief=following,
         views=_views(following, look),
         missed=Missed(),

@@ -13,6 +13,7 @@ from riseg_drake.segmentation.comparison import ViewError
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.memory import Memory
 from riseg_drake.segmentation.missing_motion import Missed
+from riseg_drake.segmentation.partition import Margins
 from riseg_drake.segmentation.propagation import UNKNOWN
 
 
@@ -24,8 +25,8 @@ class Segmentation(Immutable):
     """Number of the frame that `label` belongs to; -1 before the first."""
     label: NDArray[np.uint16]
     """[H, W], ids, UNKNOWN where something stands that has not moved yet, 0 for table and robot."""
-    margin: Mapping[int, float] = field(default_factory=dict)
-    """For each id, by how many nats a border the partition is better than the next best one."""
+    margins: Margins = field(default_factory=Margins)
+    """By how many nats a border the partition is better than the next best one."""
     settled: float = 0.0
     """The margin that leaves no doubt."""
     belief: Belief | None = None
@@ -53,6 +54,11 @@ class Segmentation(Immutable):
     """Points of objects that the keyframe does not see, as of its time."""
     at_reference: tuple[int, NDArray[np.uint16]] | None = None
     """Number of the pair's reference frame and its label [H, W]: all that the literal paper remembers."""
+
+    @property
+    def margin(self) -> dict[int, float]:
+        """For each id, by how many nats a border the partition is better than the next best one."""
+        return self.margins.least
 
     @property
     def frame(self) -> Frame | None:

@@ -23,6 +23,7 @@ from riseg_drake.pictures.cards import set_card, with_caption
 from riseg_drake.pictures.object_colors import object_colors
 from riseg_drake.pushing.arm_path import ArmPhase
 from riseg_drake.pushing.push import NO_PUSH
+from riseg_drake.segmentation.partition import Margins
 from riseg_drake.segmentation.segmentation import Segmentation
 
 INTRINSICS = Intrinsics(30, 30, 30.0, 30.0, 15.0, 15.0)
@@ -91,7 +92,7 @@ def test_a_label_stands_over_the_middle_of_its_object():
 
 def test_a_label_says_how_sure_its_object_is_and_whether_that_is_too_little():
     # By definition half sure at half the margin that settles.
-    segmentation = Segmentation(0, mask_of(1), {1: 1.0, 2: 2.0}, settled=2.0)
+    segmentation = Segmentation(0, mask_of(1), Margins({1: 1.0, 2: 2.0}, {1: 9.0, 2: 9.0}), settled=2.0)
     assert label_texts(segmentation) == {1: "1  50 %  in doubt", 2: "2  88 %"}
 
 

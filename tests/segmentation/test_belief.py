@@ -7,7 +7,7 @@ from riseg_drake.segmentation.belief import Belief, BeliefParameters
 
 
 def belief(evidence, alike):
-    return Belief(None, np.array([2.0, -1.0]), np.array(evidence), np.array(alike), *[None] * 5)
+    return Belief(None, np.array([2.0, -1.0]), np.array(evidence), np.array(alike), *[None] * 6)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """The bodies of a keyframe, by what one frame says of a few superpixels."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -22,11 +23,11 @@ def test_how_bodies_had_moved_when_the_reference_was_taken_is_told_since_the_new
     X_WB = [exp_se3(0.1 * rng.normal(size=6)) for _ in range(3)]
     since_old = [inverse(X_WO) @ X @ inverse(X_WB[0]) @ X_WO for X in X_WB]
     body = np.array([4, 4, 7])
-    then = Bodies(body, np.array([1, 1, 0]), np.array([np.eye(4), since_old[1]]), 8)
-    now = Bodies(body, np.array([1, 1, 0]), np.array([np.eye(4), since_old[2]]), 8)
+    then = Bodies(body, np.array([1, 1, 0]), np.array([np.eye(4), since_old[1]]), 8, np.zeros((8, 8)))
+    now = Bodies(body, np.array([1, 1, 0]), np.array([np.eye(4), since_old[2]]), 8, np.zeros((8, 8)))
     old = SimpleNamespace(frame=SimpleNamespace(X_WC=X_WO), area=np.array([5, 5, 5]))
     new = SimpleNamespace(frame=SimpleNamespace(X_WC=X_WN), count=4)
-    following = SimpleNamespace(keyframe=new, body=np.array([7, 4, 0, 4]), next_id=8)
+    following = SimpleNamespace(keyframe=new, body=np.array([7, 4, 0, 4]), next_id=8, told=np.zeros((8, 8)))
     told = rebased(then, now, old, following)
     expected = inverse(X_WN) @ X_WB[1] @ inverse(X_WB[2]) @ X_WN  # from the new keyframe back to then
     for superpixel, motion in enumerate([np.eye(4), expected, np.eye(4), expected]):
@@ -56,6 +57,7 @@ def a_row_of_four(body, next_id=3, across=(False, False, False), area=(100, 100,
         alike=np.zeros(3),
         body=np.array(body),
         next_id=next_id,
+        told=np.zeros((next_id, next_id)),
         part=np.arange(4),
         shown=np.full(3, 3.0),
         finer=np.zeros((0, 4), int),
@@ -93,7 +95,7 @@ def test_what_has_moved_before_by_more_than_half_of_its_area_is_a_body_though_it
     ],
 )
 def test_ids_are_those_of_the_frame_before_and_new_ones_nobodys(before, next_id, ids, following):
-    before = Bodies(np.array(before), np.zeros(4, int), STILL_AND_MOVED, 99)
+    before = Bodies(np.array(before), np.zeros(4, int), STILL_AND_MOVED, 99, np.zeros((99, 99)))
     _, bodies = told(*a_row_of_four([0, 0, 0, 0], next_id), before)
     assert (bodies.body.tolist(), bodies.next_id) == (ids, following)
 
@@ -102,3 +104,19 @@ def test_across_a_gap_all_of_both_parts_says_what_they_are_and_elsewhere_each_su
     monkeypatch.setattr(module, "evidence_of_parts", lambda *_: np.array([9.0, -3.0, 9.0]))
     seen, _ = told(*a_row_of_four([0, 0, 0, 0], across=(False, True, False)))
     np.testing.assert_allclose(seen.evidence, [0.1, -3.0 - 2.0, 0.3])
+
+
+@pytest.mark.parametrize("remembers", [True, False])
+def test_bodies_that_have_no_one_motion_are_told_apart_by_what_that_costs_and_stay_two(remembers):
+    parameters = BeliefParameters(told=remembers)
+    belief, seen = a_row_of_four([1, 1, 2, 2])
+    _, bodies = bodies_of(belief, seen, None, parameters, ObservationParameters())
+    # One motion costs both 100 nats, of which 60 are free.
+    expected = np.zeros((3, 3))
+    expected[1, 2] = expected[2, 1] = 40.0 * remembers
+    np.testing.assert_array_equal(bodies.told, expected)
+    # Later a picture in which nothing moves says that all is one: 2 + 1 + 2 nats, by 10 or 20 pixels of border.
+    belief = replace(belief, prior=np.array([2.0, 1.0, 2.0]), told=bodies.told)
+    seen = replace(seen, nats=np.zeros((2, 4)), evidence=np.zeros(3))
+    _, bodies = bodies_of(belief, seen, None, parameters, ObservationParameters())
+    assert len(np.unique(bodies.body)) == 1 + remembers

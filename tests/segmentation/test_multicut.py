@@ -64,15 +64,15 @@ def test_two_parts_that_no_one_motion_explains_are_two_though_nothing_is_seen_at
     nats = np.array([[0.0, 0, 0, 0, 0, 9.0], [9.0, 0, 0, 0, 0, 0.0]])
     weight = np.array([3.0, 3.0, 1.0, 3.0, 3.0])
     np.testing.assert_array_equal(multicut(6, ROW, weight), [0] * 6)
-    np.testing.assert_array_equal(multicut(6, ROW, weight, nats, free=7.5), [0, 0, 0, 1, 1, 1])
+    np.testing.assert_array_equal(multicut(6, ROW, weight, [(nats, 7.5)]), [0, 0, 0, 1, 1, 1])
     # 9 nats are lost, of which 8.5 are free; the half that is left is less than the weakest bond.
-    np.testing.assert_array_equal(multicut(6, ROW, weight, nats, free=8.5), [0] * 6)
+    np.testing.assert_array_equal(multicut(6, ROW, weight, [(nats, 8.5)]), [0] * 6)
 
 
 def test_a_motion_that_explains_both_costs_nothing():
     nats = np.array([[0.0, 0, 0, 9.0, 9.0, 9.0], [9.0, 9.0, 9.0, 0, 0, 0], [1.0, 0, 0, 0, 0, 1.0]])
-    np.testing.assert_array_equal(multicut(6, ROW, np.ones(5), nats[:2]), [0, 0, 0, 1, 1, 1])
-    np.testing.assert_array_equal(multicut(6, ROW, np.ones(5), nats, free=2.0), [0] * 6)
+    np.testing.assert_array_equal(multicut(6, ROW, np.ones(5), [(nats[:2], 0.0)]), [0, 0, 0, 1, 1, 1])
+    np.testing.assert_array_equal(multicut(6, ROW, np.ones(5), [(nats, 2.0)]), [0] * 6)
 
 
 def test_what_was_refused_is_asked_again_when_parts_have_grown():
@@ -80,7 +80,7 @@ def test_what_was_refused_is_asked_again_when_parts_have_grown():
     nats = np.array([[0.0, 0.0, 5.0, 0.0], [0.0, 5.0, 0.0, 0.0], [0.0, 2.0, 2.0, 0.0]])
     nats[:2, [0, 3]] = 20.0
     edges = np.array([[0, 1], [1, 2], [2, 3]])
-    np.testing.assert_array_equal(multicut(4, edges, np.array([2.5, 3.0, 2.5]), nats), [0] * 4)
+    np.testing.assert_array_equal(multicut(4, edges, np.array([2.5, 3.0, 2.5]), [(nats, 0.0)]), [0] * 4)
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -89,5 +89,16 @@ def test_without_motions_or_with_one_it_is_the_same(seed):
     edges = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if rng.uniform() < 0.5])
     weight = rng.normal(size=len(edges))
     expected = multicut(8, edges, weight)
-    np.testing.assert_array_equal(multicut(8, edges, weight, np.zeros((1, 8))), expected)
-    np.testing.assert_array_equal(multicut(8, edges, weight, np.zeros((3, 8))), expected)
+    np.testing.assert_array_equal(multicut(8, edges, weight, [(np.zeros((1, 8)), 0.0)]), expected)
+    np.testing.assert_array_equal(multicut(8, edges, weight, [(np.zeros((3, 8)), 0.0)]), expected)
+
+
+def test_two_questions_are_asked_apart_and_what_both_cost_adds_up():
+    # Two nodes whose border says 5. One answer to the first question costs 5, to the second 3; 2 are free.
+    edges, weight = np.array([[0, 1]]), np.array([5.0])
+    first, second = np.array([[0.0, 5.0], [5.0, 0.0]]), np.array([[0.0, 3.0], [3.0, 0.0]])
+    np.testing.assert_array_equal(multicut(2, edges, weight, [(first, 2.0)]), [0, 0])  # 3 of 5
+    np.testing.assert_array_equal(multicut(2, edges, weight, [(first, 2.0), (second, 2.0)]), [0, 0])  # 4 of 5
+    np.testing.assert_array_equal(multicut(2, edges, weight, [(first, 2.0), (second, 0.9)]), [0, 1])  # 5.1
+    # One question with the answers of both would be answered by the best of four.
+    np.testing.assert_array_equal(multicut(2, edges, weight, [(np.vstack([first, second]), 0.0)]), [0, 0])

@@ -35,16 +35,16 @@ def test_the_value_that_a_superpixel_shows_most_is_told():
 
 
 @pytest.mark.parametrize(
-    ("watched", "once", "evidence", "alike"),
+    ("watched", "once", "evidence", "alike", "arrives"),
     [
         # It adds up to no more than 12 nats either way, and what moved alike before and now counts once.
-        (True, True, [12.0, -12.0, 1.0], [2.0, 1.0, 0.75]),
-        (True, False, [12.0, -12.0, 1.25], [2.0, 0.0, 0.25]),
-        (False, True, [11.5, -11.5, 1.0], [0.5, 1.0, 0.75]),
+        (True, True, [12.0, -12.0, 1.0], [2.0, 1.0, 0.75], False),
+        (True, False, [12.0, -12.0, 1.25], [2.0, 0.0, 0.25], False),
+        (False, True, [11.5, -11.5, 1.0], [0.5, 1.0, 0.75], True),
     ],
 )
 def test_a_new_keyframe_knows_its_superpixels_by_what_the_old_ones_carry_and_what_is_remembered(
-    monkeypatch, watched, once, evidence, alike
+    monkeypatch, watched, once, evidence, alike, arrives
 ):
     """Four superpixels: the old 0, body 5, which moved, 1, which stood, 7 of memory, and nothing; 2 is gone."""
     of_the_old = np.tile(np.array([1, 2, 0, UNKNOWN], np.uint16), (2, 1))
@@ -56,11 +56,12 @@ def test_a_new_keyframe_knows_its_superpixels_by_what_the_old_ones_carry_and_wha
         np.array([0.5, 1.0, 0.75]),
         np.array([0, 1, 0]),
         6,
+        np.zeros((6, 6)),
         np.arange(3),
         np.full(3, 3.0),
         np.arange(3)[None],
     )
-    bodies = Bodies(np.array([5, 0, 6]), np.array([1, 0, 1]), STILL_AND_MOVED, 8)
+    bodies = Bodies(np.array([5, 0, 6]), np.array([1, 0, 1]), STILL_AND_MOVED, 8, np.zeros((8, 8)))
     new = SimpleNamespace(
         superpixels=SimpleNamespace(label=np.tile(np.arange(4), (2, 1))),
         region=(slice(0, 2), slice(0, 4)),
@@ -68,6 +69,7 @@ def test_a_new_keyframe_knows_its_superpixels_by_what_the_old_ones_carry_and_wha
         area=np.array([2, 2, 3, 2]),
         edges="edges",
         borders="borders",
+        pixels_per_metre=1.0,
     )
     frame = SimpleNamespace(gray="gray")
     given = {}
@@ -88,16 +90,29 @@ def test_a_new_keyframe_knows_its_superpixels_by_what_the_old_ones_carry_and_wha
         assert motions_K is STILL_AND_MOVED
         return old, new, source.tolist(), motion[:2].tolist(), list(range(len(motions_K)))
 
+    def parts_by(keyframe, bond, parameters, known):
+        given["known"] = known
+        return parts
+
+    # The last superpixel is of the same part as the one before, or a part of its own that came since.
+    parts = np.array([0, 1, 2, 3 if arrives else 2])
+
+    def come(old, new):
+        given["come"] = (old, new)
+        return np.full(4, arrives)
+
+    monkeypatch.setattr(module, "have_come", come)
     monkeypatch.setattr(module, "carry_superpixels", carry)
     monkeypatch.setattr(module, "make_keyframe", keyframe)
     monkeypatch.setattr(module, "border_prior", lambda *_: np.array([1.0]))
     monkeypatch.setattr(module, "carried_evidence", evidence_for)
     monkeypatch.setattr(module, "were_in_sight", in_sight)
-    monkeypatch.setattr(module, "partition", lambda keyframe, bond, parameters: np.array([0, 1, 2, 2]))
+    monkeypatch.setattr(module, "partition", parts_by)
     monkeypatch.setattr(module, "freedoms_shown", lambda *given: given)
     seen = Observation(*[None] * 3, np.array([2.0, -2.0, 0.25]), *[None] * 2) if watched else None
     belief = next_belief(old, seen, bodies, frame, None, remembered, None, BeliefParameters(once=once))
     assert given["label"] == [1, 2, 3]
+    assert given["come"] == (old.keyframe, new)
     assert list(given["moves"]) == [1, 3]
     np.testing.assert_array_equal(given["moves"][1], STILL_AND_MOVED[1])
     np.testing.assert_array_equal(given["ids"], np.tile([5, 0, 7, 0], (2, 1)))
@@ -109,10 +124,12 @@ def test_a_new_keyframe_knows_its_superpixels_by_what_the_old_ones_carry_and_wha
     np.testing.assert_array_equal(given["old"].alike, alike)
     np.testing.assert_array_equal(given["old"].body, [5, 0, 6])
     assert belief.keyframe is new
-    assert (belief.prior.tolist(), belief.evidence.tolist(), belief.next_id) == ([1.0], [0.5], 8)
+    assert (belief.prior.tolist(), belief.evidence.tolist(), belief.next_id) == ([1.0], [0.5], 8 + arrives)
     assert belief.alike.tolist() == [0.25]
     edges, gray, part, borders = belief.shown
-    assert (edges, gray, part.tolist(), borders) == ("edges", "gray", [0, 1, 2, 2], "borders")
-    # What nothing is known of is of the part that it is in.
-    assert belief.body.tolist() == [5, 0, 7, 7]
+    assert (edges, gray, part.tolist(), borders) == ("edges", "gray", parts.tolist(), "borders")
+    # What nothing is known of is of the part that it is in, or, if all of that came, a body of its own; what
+    # stood there before did not come.
+    assert belief.body.tolist() == [5, 0, 7, 8 if arrives else 7]
+    assert belief.told.shape == (8 + arrives, 8 + arrives)
     assert belief.finer.shape == (3, 4)

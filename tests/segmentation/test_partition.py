@@ -6,6 +6,7 @@ import pytest
 from riseg_drake.segmentation.border_prior import BorderPriorParameters
 from riseg_drake.segmentation.observation import ObservationParameters
 from riseg_drake.segmentation.partition import (
+    Margins,
     PartitionParameters,
     apart,
     as_tested,
@@ -84,7 +85,7 @@ def test_two_with_motions_of_their_own_are_two_though_the_border_says_one():
     nats = np.array([[0.0, 0.0, 0.0, 0.0, 70.0], [70.0, 0.0, 0.0, 0.0, 0.0]])
     bond = np.array([3.0, 3.0, 0.5, 3.0])
     assert partition(Row(), bond, PartitionParameters()).max() == 0
-    np.testing.assert_array_equal(partition(Row(), bond, PartitionParameters(), nats), [0, 0, 0, 1, 1])
+    np.testing.assert_array_equal(partition(Row(), bond, PartitionParameters(), nats=nats), [0, 0, 0, 1, 1])
 
 
 def test_a_part_moves_where_two_sure_superpixels_say_so():
@@ -170,16 +171,20 @@ def test_the_margin_is_what_the_weakest_seam_withstands():
     parameters = PartitionParameters(margins=[0.5, 1.0, 2.0, 4.0])
     # One body whose seam between 2 and 3 is worth 0.8 nats: it holds at 0.5 and falls apart at 1.
     body = np.ones(5, int)
-    assert margins(Row(), np.array([9.0, 9.0, 0.8, 9.0]), body, parameters) == {1: 1.0}
-    assert margins(Row(), np.array([9.0, 9.0, 9.0, 9.0]), body, parameters) == {1: 8.0}
+    sure = margins(Row(), np.array([9.0, 9.0, 0.8, 9.0]), body, parameters)
+    assert (sure.whole, sure.alone, sure.least) == ({1: 1.0}, {1: 8.0}, {1: 1.0})
+    assert margins(Row(), np.array([9.0, 9.0, 9.0, 9.0]), body, parameters).least == {1: 8.0}
 
 
 def test_two_that_nearly_merge_are_both_in_doubt():
     parameters = PartitionParameters(margins=[0.5, 1.0, 2.0, 4.0])
     body = np.array([1, 1, 1, 2, 2])
-    assert margins(Row(), np.array([9.0, 9.0, -0.4, 9.0]), body, parameters) == {1: 0.5, 2: 0.5}
+    sure = margins(Row(), np.array([9.0, 9.0, -0.4, 9.0]), body, parameters)
+    assert (sure.whole, sure.alone) == ({1: 8.0, 2: 8.0}, {1: 0.5, 2: 0.5})
+    assert sure.least == {1: 0.5, 2: 0.5}
     # Merging with what has not moved is no doubt about which objects there are.
-    assert margins(Row(), np.array([9.0, 9.0, -0.4, 9.0]), np.array([1, 1, 1, 0, 0]), parameters)[1] == 8.0
+    body = np.array([1, 1, 1, 0, 0])
+    assert margins(Row(), np.array([9.0, 9.0, -0.4, 9.0]), body, parameters).least[1] == 8.0
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -190,10 +195,13 @@ def test_parts_do_not_depend_on_which_end_is_first(mirrored):
     assert sizes == ([3, 3, 3, 2, 2] if mirrored else [2, 2, 3, 3, 3])
 
 
-def test_only_what_moved_can_become_surer_and_anything_less_sure():
-    before = {1: 1.0, 2: 1.0, 3: 4.0, 5: 2.0}
-    now = as_tested({1: 1.5, 2: 1.5, 3: 0.5, 4: 3.0}, before, {2})
-    assert now == {1: 1.0, 2: 1.5, 3: 0.5, 4: 3.0}
+def test_what_stood_still_is_as_whole_as_it_was_and_what_it_may_merge_with_is_asked_anew():
+    before = Margins(whole={1: 1.0, 2: 1.0, 3: 4.0, 5: 2.0}, alone={1: 0.5, 3: 4.0})
+    now = Margins(whole={1: 1.5, 2: 1.5, 3: 0.5, 4: 3.0}, alone={1: 2.0, 2: 4.0, 3: 1.0, 4: 4.0})
+    told = as_tested(now, before, {2})
+    assert told.whole == {1: 1.0, 2: 1.5, 3: 4.0, 4: 3.0}
+    assert told.alone == now.alone
+    assert told.least == {1: 1.0, 2: 1.5, 3: 1.0, 4: 3.0}
 
 
 @pytest.mark.parametrize(("least", "margin"), [(10, 0.5), (11, 8.0)])
@@ -201,4 +209,17 @@ def test_less_of_a_body_than_an_object_that_may_be_something_else_s_is_no_doubt_
     # 2 goes with what has not moved as soon as bonds are a little weaker: 10 pixels of 30.
     parameters = PartitionParameters(margins=[0.5, 1.0, 2.0, 4.0])
     bond, body = np.array([9.0, 0.3, 9.0, 9.0]), np.array([1, 1, 1, 0, 0])
-    assert margins(Row(least=least), bond, body, parameters) == {1: margin}
+    assert margins(Row(least=least), bond, body, parameters).least == {1: margin}
+
+
+def test_what_was_told_apart_stays_two_though_all_between_would_join_both():
+    # 0 and 1 are known as one body, 3 and 4 as another; 2 came into sight between them.
+    bond, known = np.full(4, 2.0), np.array([[0.0, 0.0, 0.0, 10.0, 10.0], [10.0, 10.0, 0.0, 0.0, 0.0]])
+    assert partition(Row(), bond, PartitionParameters()).max() == 0
+    part = partition(Row(), bond, PartitionParameters(), known)
+    np.testing.assert_array_equal(part[[0, 1, 3, 4]], [part[0], part[0], part[4], part[4]])
+    assert part[0] != part[4]
+    # No bond is strong enough then to put it in doubt.
+    body, bond = np.array([1, 1, 0, 2, 2]), np.array([9.0, -0.4, -0.4, 9.0])
+    assert margins(Row(), bond, body, PartitionParameters()).alone == {1: 0.5, 2: 0.5}
+    assert margins(Row(), bond, body, PartitionParameters(), known).alone == {1: 8.0, 2: 8.0}

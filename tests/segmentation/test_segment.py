@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from riseg_drake.segmentation.bfif import BFIFParameters
+from riseg_drake.segmentation.partition import Margins
 from riseg_drake.segmentation.propagation import UNKNOWN
 from riseg_drake.segmentation.segment import SegmentParameters, segment
 from riseg_drake.segmentation.segmentation import Segmentation, nothing_segmented
@@ -55,7 +56,9 @@ def test_at_first_nothing_is_segmented() -> None:
 
 def test_what_is_in_doubt_is_not_settled() -> None:
     label = np.array([[0, 1, 2, UNKNOWN]], np.uint16)
-    seen = replace(nothing_segmented((1, 4)), label=label, margin={1: 1.0, 2: 4.0}, settled=2.0)
+    seen = replace(
+        nothing_segmented((1, 4)), label=label, margins=Margins({1: 1.0, 2: 4.0}, {1: 9.0, 2: 9.0}), settled=2.0
+    )
     np.testing.assert_array_equal(seen.mask, [[0, 1, 2, 0]])
     np.testing.assert_array_equal(seen.settled_mask, [[0, 0, 2, 0]])
     assert seen.confidence == {1: pytest.approx(0.5), 2: pytest.approx(1 / (1 + np.exp(-6)))}

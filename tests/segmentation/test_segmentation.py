@@ -6,10 +6,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from riseg_drake.segmentation.partition import Margins
 from riseg_drake.segmentation.propagation import UNKNOWN
 from riseg_drake.segmentation.segmentation import Segmentation, nothing_segmented
 
 LABEL = np.array([[0, UNKNOWN, 3], [7, 7, 9]], np.uint16)
+
+
+def sure(by):
+    """Margins that are as wide to both sides."""
+    return Margins(by, by)
 
 
 def test_the_mask_has_the_ids_and_nothing_of_what_has_not_moved():
@@ -17,15 +23,18 @@ def test_the_mask_has_the_ids_and_nothing_of_what_has_not_moved():
 
 
 def test_what_is_in_doubt_by_less_than_the_settled_margin_is_not_in_the_settled_mask():
-    seen = Segmentation(0, LABEL, margin={3: 1.9, 7: 2.0, 9: 2.1}, settled=2.0)
+    seen = Segmentation(0, LABEL, margins=sure({3: 1.9, 7: 2.0, 9: 2.1}), settled=2.0)
     assert seen.settled_mask.tolist() == [[0, 0, 0], [7, 7, 9]]
 
 
 def test_an_id_that_no_rest_has_decided_on_is_in_doubt_but_not_one_that_comes_back_into_view():
-    seen = Segmentation(0, LABEL, margin={3: 2.5}, settled=2.0)
+    seen = Segmentation(0, LABEL, margins=sure({3: 2.5}), settled=2.0)
     assert seen.settled_mask.tolist() == [[0, 0, 3], [0, 0, 0]]
     assert replace(seen, memory={7: None}).settled_mask.tolist() == [[0, 0, 3], [7, 7, 0]]
-    assert replace(seen, memory={3: None}, margin={3: 1.9}).settled_mask.tolist() == [[0, 0, 0], [0, 0, 0]]
+    assert replace(seen, memory={3: None}, margins=sure({3: 1.9})).settled_mask.tolist() == [
+        [0, 0, 0],
+        [0, 0, 0],
+    ]
 
 
 def test_where_nothing_tells_of_doubt_as_in_the_paper_every_id_is_settled():
@@ -33,7 +42,7 @@ def test_where_nothing_tells_of_doubt_as_in_the_paper_every_id_is_settled():
 
 
 def test_confidence_is_a_half_at_half_the_settled_margin_and_rises_with_it():
-    seen = Segmentation(0, LABEL, margin={3: 1.0, 7: 2.0, 9: 0.0}, settled=2.0)
+    seen = Segmentation(0, LABEL, margins=sure({3: 1.0, 7: 2.0, 9: 0.0}), settled=2.0)
     # log(p / (1 - p)) = 2 margin - settled.
     assert seen.confidence == pytest.approx({3: 0.5, 7: 1 / (1 + np.exp(-2)), 9: 1 / (1 + np.exp(2))})
     assert seen.untouched_confidence == pytest.approx(1 / (1 + np.exp(2)))

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from riseg_drake.segmentation.partition import Margins
 from riseg_drake.segmentation.propagation import UNKNOWN
 from riseg_drake.segmentation.segmentation import nothing_segmented
 from riseg_drake.segmentation.untouched import untouched_clusters
@@ -42,7 +43,10 @@ def test_what_has_an_id_is_none_of_them():
 def test_one_is_as_unsure_as_an_id_without_any_margin():
     segmentation, _ = seen(known=())
     assert segmentation.untouched_confidence == pytest.approx(1 / (1 + np.e**2))
-    assert replace(segmentation, margin={4: 0.0}).confidence[4] == segmentation.untouched_confidence
+    assert (
+        replace(segmentation, margins=Margins({4: 0.0}, {4: 0.0})).confidence[4]
+        == segmentation.untouched_confidence
+    )
 
 
 def test_before_the_first_frame_there_is_none():

@@ -11,6 +11,7 @@ from riseg_drake.geometry.se3 import exp_se3, inverse, translation
 from riseg_drake.pictures.object_colors import object_colors
 from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.segmentation.bfif import no_groups
+from riseg_drake.segmentation.partition import Margins
 from riseg_drake.segmentation.segmentation import Segmentation
 from riseg_drake.timeline.file import timeline_stream
 from riseg_drake.timeline.log import TimelineLog, group_twist
@@ -47,7 +48,7 @@ def moment(time, label, **more):
     color = np.full((*CAMERA.shape, 3), 120, np.uint8)
     frame = Frame(3, time, CAMERA, color, depth, X_WC, np.zeros(CAMERA.shape, bool))
     flow = np.zeros((*CAMERA.shape, 2), np.float32)
-    segmentation = Segmentation(3, label, margin={7: 0.0})
+    segmentation = Segmentation(3, label, margins=Margins({7: 0.0}, {7: 0.0}))
     return Moment(FramePair(frame, frame), flow, np.full_like(flow, 6.0), no_groups(), segmentation, **more)
 
 

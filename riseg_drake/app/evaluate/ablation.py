@@ -46,6 +46,9 @@ WITHOUT: dict[str, Switch] = {
     "in motion whole frames, not reduced": {"frame_pair.width": 0},
     "what goes behind something counts as hidden": {"segment.evidence.observation.likelihood.covered": 1.0},
     "alike motions count at every push": {"segment.evidence.belief.once": False},
+    "any change of light costs what its factor says": {"segment.evidence.observation.likelihood.shadow": 1e9},
+    "what was told apart is forgotten where it parts": {"segment.evidence.belief.told": False},
+    "what came to where nothing stood has not moved": {"segment.evidence.belief.arrivals": False},
     "alike motions count, however little is shown": {"segment.evidence.observation.touching": -2.0},
 }
 """What line 7 by evidence consists of, by what is missing."""
