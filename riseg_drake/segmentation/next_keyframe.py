@@ -74,8 +74,8 @@ def next_belief(
     in_sight = were_in_sight(old, new, source, bodies.motion[source], bodies.motions_K)
     origin = Origin(source, body, in_sight)
     evidence, alike = carried_evidence(replace(belief, body=bodies.body), new, prior, origin, parameters.inside)
-    told = identity_costs(bodies.told, body, new.area)
-    part = partition(new, prior + evidence, parameters.partition, told)
+    costs = identity_costs(bodies.told, body, new.area)
+    part = partition(new, prior + evidence, parameters.partition, costs)
     body, next_id = with_arrivals(
         completed(body, known, part, new.area),
         part,
@@ -94,7 +94,7 @@ def next_belief(
         told=np.pad(bodies.told, (0, next_id - bodies.next_id)),
         part=part,
         shown=freedoms_shown(new.edges, frame.gray, part, new.borders),
-        finer=_finer(new, prior + evidence, parameters, told),
+        finer=_finer(new, prior + evidence, parameters, costs),
     )
 
 

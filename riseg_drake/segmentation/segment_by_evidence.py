@@ -228,8 +228,8 @@ def _carried(
     sure = now.margins
     if deciding and seen is not None:
         bond = belief.with_evidence(seen.evidence, parameters.belief).bond
-        told = identity_costs(bodies.told, bodies.body, belief.keyframe.area)
-        sure = margins(belief.keyframe, bond, bodies.body, parameters.belief.partition, told)
+        known = identity_costs(bodies.told, bodies.body, belief.keyframe.area)
+        sure = margins(belief.keyframe, bond, bodies.body, parameters.belief.partition, known)
         sure = as_tested(sure, now.margins, moves)
     # What was decided in motion is looked at once more when it rests.
     decided = now.decided or (deciding and now.still_since is not None)

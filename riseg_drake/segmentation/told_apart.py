@@ -8,6 +8,8 @@ true wherever they are.
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.segmentation.likelihood import nats_of_parts
+
 
 def identity_costs(
     told: NDArray[np.float64], body: NDArray[np.intp], area: NDArray[np.intp]
@@ -61,12 +63,14 @@ def with_lost(
     shared = np.zeros((next_id, next_id))
     np.add.at(shared, (following, body), area)
     # What is out of sight is what it was.
-    was = np.where(shared.any(1), shared.argmax(1), np.arange(next_id))
-    known = np.zeros((next_id, next_id))
-    known[: len(told), : len(told)] = told
-    inherited = np.where(was == was[:, None], 0.0, known[np.ix_(was, was)])
-    cost = np.array([np.bincount(following, n, next_id) for n in nats])
+    is_here = shared.any(1)
+    was = np.where(is_here, shared.argmax(1), np.arange(next_id))
+    known = np.pad(told, (0, next_id - len(told)))
+    both = np.where(was == was[:, None], 0.0, known[np.ix_(was, was)])
+    # Long recordings have many ids, and a picture few of them.
+    ids = np.flatnonzero(is_here)
+    cost = nats_of_parts(nats, (np.cumsum(is_here) - 1)[following])
     lost = (cost[:, :, None] + cost[:, None]).min(0) - cost.min(0) - cost.min(0)[:, None] - free
-    both = np.maximum(inherited, np.maximum(lost, 0.0))
+    both[np.ix_(ids, ids)] = np.maximum(both[np.ix_(ids, ids)], lost)
     both[0] = both[:, 0] = 0.0
     return both
