@@ -22,6 +22,7 @@ from riseg_drake.segmentation.superpixels import (
     superpixels,
     with_gaps,
     with_occlusions,
+    with_pieces,
 )
 from riseg_drake.segmentation.support import may_lie_on
 from riseg_drake.segmentation.surface import SurfacePixels, surface_pixels
@@ -44,6 +45,8 @@ class KeyframeParameters:
     """At most so many pixels sharpen motions."""
     behind: float = 0.012
     """m; surfaces on both sides of what is in front of them may be one if they are as high within that."""
+    pieces: bool = True
+    """What was one body is one, in however many pieces it is seen now."""
     gap: float = 0.01
     """m; the widest gap across which two things that are seen may be one."""
 
@@ -147,8 +150,11 @@ def make_keyframe(
     if bodies is not None:
         cut = split_superpixels(cut, bodies[region])
     height = cv2.medianBlur(height, 5)
-    cut = with_occlusions(cut, height, parameters.behind)
+    table = (np.isfinite(above.height) & ~above.mask & ~frame.robot)[region]
+    cut = with_occlusions(cut, height, table, parameters.behind)
     cut = with_gaps(cut, parameters.gap * above.pixels_per_metre(frame.intrinsics))
+    if bodies is not None and parameters.pieces:
+        cut = with_pieces(cut, bodies[region])
     owner = np.full(above.mask.shape, -1, np.intp)
     owner[region] = cut.label
     area = np.bincount(cut.label[cut.label >= 0], minlength=cut.count)

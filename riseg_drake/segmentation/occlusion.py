@@ -1,64 +1,62 @@
 """Where a surface may go on behind what stands before it: superpixels that do not touch, and may be one body.
 
-Along a line of the picture heights rise to what is in front, and fall again behind it. What is as high on both
-sides may be one thing that is seen in two pieces; only motion can tell.
+What is as high on both sides of what is higher may be one thing that is seen in two pieces; only motion can
+tell.
 """
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.segmentation.scales import LOWEST
 
-_BESIDE = 3
-"""Pixels from a border at which heights are read: nearer they are blurred."""
-_EVERY = 2
-"""Lines of the picture between two that are looked at."""
+_FACE = 1.5
+"""Sides of a superpixel from its middle within which what is in front rises: from aside its face is seen."""
+_ON_THE_WAY = (1, 2, 4, 24)
+"""Into how many equal parts the way from one to the other is cut in turn: what is not behind anything is mostly
+found out by its middle."""
 
 
 def seen_in_pieces(
-    label: NDArray[np.intp], height: NDArray[np.float32], level: float
+    label: NDArray[np.intp], height: NDArray[np.float32], table: NDArray[np.bool_], level: float
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """Pairs of superpixels that may be one behind what is between them.
 
     Args:
-        label: [H, W], 0..N-1 of superpixels, -1 where nothing stands.
-        height: [H, W], m above the table.
+        label: [H, W], 0..N-1 of superpixels, -1 where nothing stands, or nothing is known.
+        height: [H, W], m above the table, where something stands.
+        table: [H, W], where it is seen.
         level: m; surfaces on both sides whose heights differ by more are two.
 
     Returns:
         Pairs [M, 2], the smaller number first, rising, and how wide what each shares is, pixels [M].
     """
-    pairs: dict[tuple[int, int], float] = {}
-    for labels, heights in ((label, height), (label.T, height.T)):
-        for line in range(_EVERY // 2, len(labels), _EVERY):
-            for a, b in _along(labels[line], heights[line], level):
-                if a != b:
-                    pair = (min(a, b), max(a, b))
-                    pairs[pair] = pairs.get(pair, 0.0) + _EVERY
-    found = sorted(pairs)
-    return np.array(found, np.intp).reshape(-1, 2), np.array([pairs[pair] for pair in found], float)
-
-
-def _along(label: NDArray[np.intp], height: NDArray[np.float32], level: float) -> list[tuple[int, int]]:
-    """The pairs of superpixels along one line [W] of the picture."""
-    border = np.flatnonzero(label[1:] != label[:-1])  # between that pixel and the next one
-    before = height[np.maximum(border - _BESIDE + 1, 0)]
-    after = height[np.minimum(border + _BESIDE, len(height) - 1)]
-    sides = np.stack([label[border], label[border + 1]], axis=1)
-    found: list[tuple[int, int]] = []
-    waiting: list[tuple[int, float]] = []  # what went behind something, the lowest first, and its height
-    for (a, b), h_0, h_1 in zip(sides.tolist(), before.tolist(), after.tolist(), strict=True):
-        if a < 0 or b < 0:
-            waiting = []  # the table is seen
-        elif h_1 > h_0 + LOWEST:
-            waiting.append((a, h_0))
-        elif h_1 < h_0 - LOWEST:
-            lower = []
-            while waiting and waiting[-1][1] > h_1 - level:
-                behind, h = waiting.pop()
-                if h < h_1 + level:
-                    found.append((behind, b))
-                if h < h_1 - LOWEST:  # what is higher may be in front of it, too
-                    lower.append((behind, h))
-            waiting += reversed(lower)
-    return found
+    stands = label >= 0
+    area = np.bincount(label[stands])
+    centre = np.stack([np.bincount(label[stands], at) for at in np.nonzero(stands)]) / np.maximum(area, 1)
+    own = np.bincount(label[stands], height[stands]) / np.maximum(area, 1)
+    face = _FACE * np.sqrt(np.median(area)) if len(area) else 0.0
+    highest = cv2.dilate(np.where(stands, height, 0.0), np.ones((2 * round(face) + 1,) * 2, np.uint8))
+    beside = np.zeros(len(area))
+    np.maximum.at(beside, label[stands], highest[stands])
+    front = np.flatnonzero(beside > own + LOWEST)
+    a, b = front[np.stack(np.triu_indices(len(front), 1))]
+    a, b = np.stack([a, b])[:, np.abs(own[a] - own[b]) < level]
+    for parts in _ON_THE_WAY:
+        at = (np.arange(parts) + 0.5) / parts
+        (v_a, u_a), (v_b, u_b) = centre[:, a], centre[:, b]
+        v, u = (
+            np.rint(p[:, None] + (q - p)[:, None] * at).astype(np.intp) for p, q in ((v_a, v_b), (u_a, u_b))
+        )
+        between = (label[v, u] != a[:, None]) & (label[v, u] != b[:, None])
+        long = np.hypot(v_b - v_a, u_b - u_a)[:, None]
+        inner = between & (long * np.minimum(at, 1 - at) > face)
+        low = height[v, u] < (np.maximum(own[a], own[b]) + LOWEST)[:, None]
+        hidden = ~(between & table[v, u]).any(1) & ~(inner & low & stands[v, u]).any(1)
+        a, b = a[hidden], b[hidden]
+    hidden = inner[hidden].any(1)
+    a, b = a[hidden], b[hidden]
+    # What may go on as any of several shares its width with them.
+    partners = np.bincount(a, minlength=len(area)) + np.bincount(b, minlength=len(area))
+    width = np.sqrt(np.minimum(area[a], area[b])) / np.maximum(partners[a], partners[b])
+    return np.stack([a, b], axis=1), width

@@ -6,6 +6,9 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
 from riseg_drake.geometry.nearest import nearest_values
 from riseg_drake.segmentation.occlusion import seen_in_pieces
@@ -100,12 +103,15 @@ def _with_borders(label: NDArray[np.intp], count: int) -> Superpixels:
     return Superpixels(label, count, borders, length[code], behind=touch, across=touch)
 
 
-def with_occlusions(cut: Superpixels, height: NDArray[np.float32], level: float) -> Superpixels:
+def with_occlusions(
+    cut: Superpixels, height: NDArray[np.float32], table: NDArray[np.bool_], level: float
+) -> Superpixels:
     """The superpixels, with borders between those that may be one behind what is in front of them.
 
-    `height` [H, W], m above the table; surfaces on both sides are as high as each other within `level`, m.
+    `height` [H, W], m above the `table`, which is seen [H, W]; surfaces on both sides are as high as each other
+    within `level`, m.
     """
-    pairs, width = seen_in_pieces(cut.label, height, level)
+    pairs, width = seen_in_pieces(cut.label, height, table, level)
     return _with_more(cut, pairs, width, across=False)
 
 
@@ -125,6 +131,37 @@ def with_gaps(cut: Superpixels, widest: float) -> Superpixels:
     of[cut.label[inside]] = island[inside]
     parted = of[beyond.borders[:, 0]] != of[beyond.borders[:, 1]]
     return _with_more(cut, beyond.borders[parted], beyond.length[parted], across=True)
+
+
+def with_pieces(cut: Superpixels, bodies: NDArray[np.integer]) -> Superpixels:
+    """The superpixels, with borders between the pieces in which each body of a label image [H, W] is seen.
+
+    What was one body goes on to be one, wherever other things hide the middle of it.
+    """
+    inside = cut.label >= 0
+    owner = cut.label[inside]
+    body = np.zeros(cut.count, np.intp)
+    body[owner] = bodies[inside]
+    area = np.bincount(owner, minlength=cut.count)
+    centre = np.stack([np.bincount(owner, at, cut.count) for at in np.nonzero(inside)], axis=1) / area[:, None]
+    a, b = cut.borders[body[cut.borders[:, 0]] == body[cut.borders[:, 1]]].T
+    _, piece = connected_components(
+        coo_array((np.ones(len(a)), (a, b)), shape=(cut.count,) * 2), directed=False
+    )
+    size = np.bincount(piece, area)
+    pairs: list[tuple[int, int]] = []
+    length: list[float] = []
+    for each in np.unique(body[body > 0]):
+        pieces = np.unique(piece[body == each])
+        main = pieces[size[pieces].argmax()]
+        tree, of_main = KDTree(centre[piece == main]), np.flatnonzero(piece == main)
+        for other in pieces[pieces != main]:
+            its = np.flatnonzero(piece == other)
+            distance, nearest = tree.query(centre[its])
+            pair = int(its[distance.argmin()]), int(of_main[nearest[distance.argmin()]])
+            pairs.append((min(pair), max(pair)))
+            length.append(float(np.sqrt(size[other])))
+    return _with_more(cut, np.array(pairs, np.intp).reshape(-1, 2), np.array(length), across=False)
 
 
 def _with_more(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from riseg_drake.segmentation.superpixels import Superpixels, superpixels, with_gaps
+from riseg_drake.segmentation.superpixels import Superpixels, superpixels, with_gaps, with_pieces
 from tests.segmentation.drawn_scene import Texture
 
 HEIGHT, WIDTH = 60, 80
@@ -32,6 +32,23 @@ def textured() -> np.ndarray:
     v, u = np.mgrid[:HEIGHT, :WIDTH]
     points = np.stack([u, v, 0 * u], axis=-1).reshape(-1, 3) * 0.001
     return np.clip(Texture(0).color(points), 0, 255).reshape(HEIGHT, WIDTH, 3).astype(np.uint8)
+
+
+def test_a_body_that_is_seen_in_pieces_stays_one_by_their_nearest_superpixels() -> None:
+    """Five strips: two of the body 1, one of the body 2, one of 1 again, and what is no body."""
+    label = np.repeat(np.arange(5), [20, 10, 10, 5, 10])[None].repeat(8, axis=0)
+    none = np.zeros(4, bool)
+    row = Superpixels(label, 5, np.array([[0, 1], [1, 2], [2, 3], [3, 4]]), np.full(4, 8.0), none, none)
+    bodies = np.array([1, 1, 2, 1, 0])[label]
+    whole = with_pieces(row, bodies)
+    np.testing.assert_array_equal(whole.borders, [[0, 1], [1, 2], [1, 3], [2, 3], [3, 4]])
+    np.testing.assert_array_equal(whole.behind, np.arange(5) == 2)
+    # As strong as the smaller piece is wide, sqrt(5 x 8).
+    np.testing.assert_allclose(whole.length, [8, 8, 40**0.5, 8, 8])
+    assert not whole.across.any()
+    # What touches is in one piece, and of what is no body nothing is known.
+    for one in (np.array([1, 1, 1, 1, 2]), np.array([0, 0, 2, 0, 0])):
+        np.testing.assert_array_equal(with_pieces(row, one[label]).borders, row.borders)
 
 
 @pytest.mark.parametrize("size", [3, 6, 15])
