@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.rgbd import Immutable
 from riseg_drake.segmentation.border_prior import BorderPriorParameters
 from riseg_drake.segmentation.keyframe import Keyframe, KeyframeParameters
+from riseg_drake.segmentation.observation import Observation
 from riseg_drake.segmentation.partition import PartitionParameters
 
 
@@ -29,6 +30,8 @@ class BeliefParameters:
     """What stands where nothing stood before has moved, though no motion was found (`arrivals`)."""
     most: float = 12.0
     """Evidence of a border adds up to no more than that, nats, so that it can be revised."""
+    strangers: bool = True
+    """What falls off its body was no part of it: forget what was known of it as a part (not in the paper)."""
     weaker: list[float] = field(default_factory=lambda: [0.5, 1.0, 1.5])
     """Log-odds by which all bonds are weakened in turn, to see what else may be a body."""
 
@@ -44,6 +47,8 @@ class Belief(Immutable):
     """[M], what motion has added."""
     alike: NDArray[np.float64]
     """[M], how much of it as both sides have moved alike."""
+    inherited: NDArray[np.float64]
+    """[M], how much of the evidence is known of the bodies that the sides belong to, and was not seen here."""
     body: NDArray[np.intp]
     """[N], ids; 0 where nothing has moved yet."""
     next_id: int
@@ -66,10 +71,12 @@ class Belief(Immutable):
         """[M], log-odds that both sides of a border are one body."""
         return self.prior + self.evidence
 
-    def with_evidence(self, seen: NDArray[np.float64], parameters: BeliefParameters) -> "Belief":
-        """The same with what one frame adds to the evidence of each border [M]."""
+    def with_evidence(self, seen: Observation, parameters: BeliefParameters) -> "Belief":
+        """The same with what one frame adds to the evidence of each border."""
+        inherited = np.where(seen.strangers[self.keyframe.borders].any(1), 0.0, self.inherited)
         before = self.alike if parameters.once else np.zeros_like(self.alike)
-        alike = np.maximum(before, seen)
-        evidence = self.evidence + np.minimum(seen, 0.0) + alike - before
+        alike = np.maximum(before, seen.evidence)
+        known = self.evidence - self.inherited + inherited
+        evidence = known + np.minimum(seen.evidence, 0.0) + alike - before
         evidence = np.clip(evidence, -parameters.most, parameters.most)
-        return replace(self, evidence=evidence, alike=alike)
+        return replace(self, evidence=evidence, alike=alike, inherited=inherited)

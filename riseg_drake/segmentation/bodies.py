@@ -55,23 +55,27 @@ def bodies_of(
     """The bodies, with what one frame says, and that with what the bodies' motions add to its evidence.
 
     Ids are those of the belief, and for what it did not know those of the frame before. A body that no one
-    motion explains falls apart for it.
+    motion explains falls apart for it, and what falls off it is no more what that was known to be.
     """
     keyframe = belief.keyframe
     motion = motions_of_parts(belief.body, seen.nats, parameters.partition)[belief.body]
     told = moving_apart(belief.told, belief.body, motion)
     known = identity_costs(told, belief.body, keyframe.area)
 
-    def parts_by(evidence: NDArray[np.float64]) -> NDArray[np.intp]:
-        bond = belief.with_evidence(evidence, parameters).bond
+    def parts_by(seen: Observation) -> NDArray[np.intp]:
+        bond = belief.with_evidence(seen, parameters).bond
         return partition(keyframe, bond, parameters.partition, known, seen.nats)
 
-    part = parts_by(seen.evidence)
+    part = parts_by(seen)
+    strangers = split_off(part, belief.body, keyframe.area)
+    if parameters.strangers and strangers.any():
+        seen, known = replace(seen, strangers=strangers), np.where(strangers, 0.0, known)
+        part = parts_by(seen)
     if keyframe.across.any():
         # What lies about a gap says little of its motion; all of both pieces together may be sure of it.
         of_parts = evidence_of_parts(seen, keyframe, part, belief.shown, observation)
         seen = replace(seen, evidence=np.where(keyframe.across, of_parts, seen.evidence))
-        part = parts_by(seen.evidence)
+        part = parts_by(seen)
     seen = replace(seen, evidence=seen.evidence + apart(keyframe, part, seen.nats, parameters.partition))
     motion = motions_of_parts(part, seen.nats, parameters.partition)
     found_before = np.bincount(part, keyframe.area * (belief.body > 0), len(motion))
@@ -84,6 +88,13 @@ def bodies_of(
     told = with_lost(told, belief.body, body, next_id, seen.nats, keyframe.area, free)
     told = told if parameters.told else np.zeros_like(told)
     return seen, Bodies(body, motion[part], seen.motions_K, next_id, told)
+
+
+def split_off(part: NDArray[np.intp], body: NDArray[np.intp], area: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """[N], what is not in the largest of the parts [N] into which its body [N] falls."""
+    shared = np.zeros((int(body.max(initial=0)) + 1, int(part.max(initial=-1)) + 1))
+    np.add.at(shared, (body, part), area)
+    return np.asarray((body > 0) & (shared.argmax(1)[body] != part))
 
 
 def carry_bodies(

@@ -65,8 +65,9 @@ def were_in_sight(
 
 def carried_evidence(
     old: Belief, new: Keyframe, new_prior: NDArray[np.float64], origin: Origin, inside: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Evidence [M] for the borders of the new keyframe, and how much of it as both sides have moved alike [M].
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Evidence [M] for the borders of the new keyframe, how much of it as both sides have moved alike [M], and
+    how much as it is known of their bodies [M].
 
     What comes into sight may be of any body beside it with which it was hidden before. Of what was one
     superpixel before, both sides are one body by `inside` nats.
@@ -95,7 +96,9 @@ def carried_evidence(
     evidence = np.where(known & (from_a == from_b), inside, np.where(same_border, remembered, apart))
     evidence = np.where(known | (body[a] > 0) | (body[b] > 0), evidence, 0.0)
     of_two = np.where(body[a] != body[b], np.maximum(alike_between, 0.0), 0.0)
-    return evidence, np.where(same_border, alike, of_two)
+    of_bodies = np.where((body[a] != body[b]) & (evidence != 0), apart, 0.0)
+    inherited = np.where(same_border, np.append(old.inherited, 0.0)[place], of_bodies)
+    return evidence, np.where(same_border, alike, of_two), inherited
 
 
 def _same_borders(

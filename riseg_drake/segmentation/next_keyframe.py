@@ -33,6 +33,7 @@ def first_belief(
         prior=prior,
         evidence=np.zeros(len(keyframe.borders)),
         alike=np.zeros(len(keyframe.borders)),
+        inherited=np.zeros(len(keyframe.borders)),
         body=np.zeros(keyframe.count, np.intp),
         next_id=1,
         told=np.zeros((1, 1)),
@@ -68,12 +69,14 @@ def next_belief(
     source = _most_seen(new, carried) - 1
     known = source >= 0
     if seen is not None:
-        belief = belief.with_evidence(seen.evidence, parameters)
+        belief = belief.with_evidence(seen, parameters)
     body = np.where(known, bodies.body[source], _most_seen(new, np.where(carried == 0, ids, 0)))
     prior = border_prior(new, parameters.prior)
     in_sight = were_in_sight(old, new, source, bodies.motion[source], bodies.motions_K)
     origin = Origin(source, body, in_sight)
-    evidence, alike = carried_evidence(replace(belief, body=bodies.body), new, prior, origin, parameters.inside)
+    evidence, alike, inherited = carried_evidence(
+        replace(belief, body=bodies.body), new, prior, origin, parameters.inside
+    )
     costs = identity_costs(bodies.told, body, new.area)
     part = partition(new, prior + evidence, parameters.partition, costs)
     body, next_id = with_arrivals(
@@ -89,6 +92,7 @@ def next_belief(
         prior=prior,
         evidence=evidence,
         alike=alike,
+        inherited=inherited,
         body=body,
         next_id=next_id,
         told=np.pad(bodies.told, (0, next_id - bodies.next_id)),

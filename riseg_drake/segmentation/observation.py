@@ -76,6 +76,8 @@ class Observation(Immutable):
     """[N], pixels by which its motion moves a superpixel: how well it tells motions apart."""
     share: NDArray[np.float64]
     """[G], how common each motion is."""
+    strangers: NDArray[np.bool_]
+    """[N], what has proved to be no part of its body."""
 
 
 def observe(
@@ -124,6 +126,7 @@ def observe(
         evidence=_evidence(keyframe, q, share, shown, parameters),
         span=np.array(spans)[motion],
         share=share,
+        strangers=np.zeros(keyframe.count, bool),
     )
 
 

@@ -227,7 +227,7 @@ def _carried(
     )
     sure = now.margins
     if deciding and seen is not None:
-        bond = belief.with_evidence(seen.evidence, parameters.belief).bond
+        bond = belief.with_evidence(seen, parameters.belief).bond
         known = identity_costs(bodies.told, bodies.body, belief.keyframe.area)
         sure = margins(belief.keyframe, bond, bodies.body, parameters.belief.partition, known)
         sure = as_tested(sure, now.margins, moves)

@@ -66,7 +66,9 @@ def with_lost(
     is_here = shared.any(1)
     was = np.where(is_here, shared.argmax(1), np.arange(next_id))
     known = np.pad(told, (0, next_id - len(told)))
-    both = np.where(was == was[:, None], 0.0, known[np.ix_(was, was)])
+    # What falls off a body has a part in what was known of that.
+    portion = np.where(is_here, shared.max(1) / np.maximum(shared.sum(0)[was], 1), 1.0)
+    both = np.where(was == was[:, None], 0.0, known[np.ix_(was, was)] * portion[:, None] * portion)
     # Long recordings have many ids, and a picture few of them.
     ids = np.flatnonzero(is_here)
     cost = nats_of_parts(nats, (np.cumsum(is_here) - 1)[following])

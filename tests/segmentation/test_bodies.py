@@ -55,6 +55,7 @@ def a_row_of_four(body, next_id=3, across=(False, False, False), area=(100, 100,
         prior=np.array([2.0, -1, 2]),
         evidence=np.zeros(3),
         alike=np.zeros(3),
+        inherited=np.zeros(3),
         body=np.array(body),
         next_id=next_id,
         told=np.zeros((next_id, next_id)),
@@ -64,7 +65,9 @@ def a_row_of_four(body, next_id=3, across=(False, False, False), area=(100, 100,
     )
     nats = np.array([[50.0, 50, 0, 0], [0, 0, 50, 50]])
     said = np.array([0.1, -0.2, 0.3])
-    seen = Observation(STILL_AND_MOVED, np.array([1, 1, 0, 0]), nats, said, np.ones(4), np.full(2, 0.5))
+    seen = Observation(
+        STILL_AND_MOVED, np.array([1, 1, 0, 0]), nats, said, np.ones(4), np.full(2, 0.5), np.zeros(4, bool)
+    )
     return belief, seen
 
 
@@ -120,3 +123,16 @@ def test_bodies_that_have_no_one_motion_are_told_apart_by_what_that_costs_and_st
     seen = replace(seen, nats=np.zeros((2, 4)), evidence=np.zeros(3))
     _, bodies = bodies_of(belief, seen, None, parameters, ObservationParameters())
     assert len(np.unique(bodies.body)) == 1 + remembers
+
+
+@pytest.mark.parametrize("forgets", [True, False])
+def test_what_falls_off_its_body_is_no_more_held_apart_from_others_by_what_that_was(forgets):
+    """The third of four was of the body of the first two, which is not the last one's; it stands as that."""
+    belief, seen = a_row_of_four([1, 1, 1, 2])
+    apart = np.zeros((3, 3))
+    apart[1, 2] = apart[2, 1] = 90.0
+    inherited = np.array([0.0, 0.0, -4.0])
+    belief = replace(belief, evidence=inherited, inherited=inherited, told=apart)
+    told, bodies = bodies_of(belief, seen, None, BeliefParameters(strangers=forgets), ObservationParameters())
+    assert bodies.body.tolist() == ([1, 1, 2, 2] if forgets else [1, 1, 3, 2])
+    assert told.strangers.tolist() == [False, False, forgets, False]

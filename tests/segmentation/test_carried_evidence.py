@@ -30,9 +30,10 @@ def carried(
     length=None,
     over=False,
     alike=None,
+    inherited=None,
 ):
     """Evidence for new borders; 4 nats would be against what never met, 1 for what was one body. With `alike`,
-    how much of it as both sides moved alike."""
+    how much of it as both sides moved alike; with `inherited`, how much by their bodies."""
     keyframe = SimpleNamespace(
         borders=np.array(old_borders),
         count=len(old_body),
@@ -41,11 +42,12 @@ def carried(
     evidence = np.array(old_evidence, float)
     was = np.full(len(evidence), 2.0)
     of_it = np.zeros(len(evidence)) if alike is None else np.array(alike)
-    old = Belief(keyframe, was, evidence, of_it, np.array(old_body), *[None] * 5)
+    of_bodies = np.zeros(len(evidence)) if inherited is None else np.array(inherited)
+    old = Belief(keyframe, was, evidence, of_it, of_bodies, np.array(old_body), *[None] * 5)
     across = np.zeros(len(new_borders), bool) if across is None else np.array(across)
     new = SimpleNamespace(borders=np.array(new_borders), across=across, over=np.full(len(across), over))
     told = carried_evidence(old, new, np.full(len(new_borders), prior), origin, inside=2.0)
-    return told[0] if alike is None else told[1]
+    return told[0] if alike is None and inherited is None else told[1 if inherited is None else 2]
 
 
 def test_what_comes_into_sight_may_be_any_body_with_which_it_was_hidden():
@@ -136,6 +138,15 @@ def test_inside_one_body_nothing_is_remembered_as_alike_but_of_its_own_borders()
     origin = Origin(np.array([0, 0, 1]), np.array([5, 5, 5]), NO)
     told = carried([[0, 1]], [3.0], np.array([5, 5]), [[0, 1], [1, 2], [0, 2]], origin, alike=[1.5])
     assert told == pytest.approx([0.0, 1.5, 1.5])
+
+
+def test_what_is_known_of_bodies_alone_is_kept_apart_until_a_border_was_seen():
+    # 0 and 1 are the body 5, 2 and 3 the body 6, 4 is uncovered; 1 and 2 meet still, by 3 nats of their bodies.
+    origin = Origin(np.array([0, 1, 2, 3, -1]), np.array([5, 5, 6, 6, 0]), np.ones(5, bool))
+    met, new = [[0, 1], [1, 2], [2, 3]], [[0, 1], [1, 2], [0, 3], [1, 3], [3, 4]]
+    told = carried(met, [1.0, -5.0, 1.0], np.array([5, 5, 6, 6]), new, origin, inherited=[0.0, -3.0, 0.0])
+    # Where both meet now, all of it is by their bodies, as it is of what would have been seen.
+    assert told == pytest.approx([0.0, -3.0, -4.0, -4.0, -4.0])
 
 
 NEW = 3

@@ -50,10 +50,11 @@ def test_a_new_keyframe_knows_its_superpixels_by_what_the_old_ones_carry_and_wha
     of_the_old = np.tile(np.array([1, 2, 0, UNKNOWN], np.uint16), (2, 1))
     remembered = np.tile(np.array([0, 9, 7, UNKNOWN], np.uint16), (2, 1))
     old = Belief(
-        SimpleNamespace(count=3),
+        SimpleNamespace(count=3, borders=np.array([[0, 1], [0, 2], [1, 2]])),
         np.zeros(3),
         np.array([11.5, -11.5, 1.0]),
         np.array([0.5, 1.0, 0.75]),
+        np.zeros(3),
         np.array([0, 1, 0]),
         6,
         np.zeros((6, 6)),
@@ -84,7 +85,7 @@ def test_a_new_keyframe_knows_its_superpixels_by_what_the_old_ones_carry_and_wha
 
     def evidence_for(old, keyframe, prior, origin, inside):
         given.update(old=old, origin=origin)
-        return np.array([0.5]), np.array([0.25])
+        return np.array([0.5]), np.array([0.25]), np.array([0.125])
 
     def in_sight(old, new, source, motion, motions_K):
         assert motions_K is STILL_AND_MOVED
@@ -109,7 +110,8 @@ def test_a_new_keyframe_knows_its_superpixels_by_what_the_old_ones_carry_and_wha
     monkeypatch.setattr(module, "were_in_sight", in_sight)
     monkeypatch.setattr(module, "partition", parts_by)
     monkeypatch.setattr(module, "freedoms_shown", lambda *given: given)
-    seen = Observation(*[None] * 3, np.array([2.0, -2.0, 0.25]), *[None] * 2) if watched else None
+    said, strangers = np.array([2.0, -2.0, 0.25]), np.zeros(3, bool)
+    seen = Observation(*[None] * 3, said, *[None] * 2, strangers) if watched else None
     belief = next_belief(old, seen, bodies, frame, None, remembered, None, BeliefParameters(once=once))
     assert given["label"] == [1, 2, 3]
     assert given["come"] == (old.keyframe, new)
@@ -125,7 +127,7 @@ def test_a_new_keyframe_knows_its_superpixels_by_what_the_old_ones_carry_and_wha
     np.testing.assert_array_equal(given["old"].body, [5, 0, 6])
     assert belief.keyframe is new
     assert (belief.prior.tolist(), belief.evidence.tolist(), belief.next_id) == ([1.0], [0.5], 8 + arrives)
-    assert belief.alike.tolist() == [0.25]
+    assert (belief.alike.tolist(), belief.inherited.tolist()) == ([0.25], [0.125])
     edges, gray, part, borders = belief.shown
     assert (edges, gray, part.tolist(), borders) == ("edges", "gray", parts.tolist(), "borders")
     # What nothing is known of is of the part that it is in, or, if all of that came, a body of its own; what

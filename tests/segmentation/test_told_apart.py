@@ -50,12 +50,12 @@ def test_what_one_motion_costs_two_bodies_beyond_what_is_free_is_remembered():
     np.testing.assert_array_equal(with_lost(told(), BODY, BODY, 4, nats, AREA, free=70.0), told())
 
 
-def test_what_falls_off_a_body_is_as_much_another_as_that_was_and_what_is_out_of_sight_stays():
+def test_what_falls_off_a_body_has_a_part_in_what_that_was_told_and_what_is_out_of_sight_keeps_all():
     silent = np.zeros((2, 6))
     following = np.array([1, 4, 0, 2, 2, 3])
     before = told((1, 2, 80.0), (2, 3, 7.0))
     after = with_lost(before, BODY, following, 5, silent, AREA, free=60.0)
-    np.testing.assert_array_equal(after, told((1, 2, 80.0), (4, 2, 80.0), (2, 3, 7.0), count=5))
+    np.testing.assert_array_equal(after, told((1, 2, 20.0), (4, 2, 60.0), (2, 3, 7.0), count=5))
     gone = np.array([0, 0, 0, 2, 2, 3])
     np.testing.assert_array_equal(with_lost(before, gone, gone, 4, silent, AREA, free=60.0), before)
 
