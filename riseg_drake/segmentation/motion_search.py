@@ -25,6 +25,7 @@ from riseg_drake.segmentation.likelihood import (
     unexplained_parts,
 )
 from riseg_drake.segmentation.motions import flow_difference
+from riseg_drake.segmentation.recognition import RecognitionParameters, recognised_motions
 from riseg_drake.segmentation.slides import SlideCosts, slides
 
 
@@ -54,6 +55,7 @@ class MotionSearchParameters:
     """Pixels (root mean square) within which two motions are one, and what moves stands still."""
     rounds: int = 24
     """Patches that are tried at most."""
+    recognition: RecognitionParameters = field(default_factory=RecognitionParameters)
     alignment: AlignmentParameters = field(
         default_factory=lambda: AlignmentParameters(rounds=5, turn=0.1, shift=0.01)
     )
@@ -108,6 +110,8 @@ def search_motions(problem: SearchProblem, proposed_K: NDArray[np.float64]) -> N
     """
     keyframe, parameters, likelihood = problem.compared.keyframe, problem.parameters, problem.likelihood
     search = Search(problem, np.empty((0, 4, 4)))
+    for motion in recognised_motions(problem.compared, problem.above.mask, parameters.recognition):
+        search.take(search.sharpened(motion), np.zeros(keyframe.count, bool))
     asked = search.costs.point_count > likelihood.correlated_gray
     tried = np.zeros(keyframe.count, bool)
     for _ in range(parameters.rounds):

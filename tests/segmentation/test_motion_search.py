@@ -26,6 +26,7 @@ from riseg_drake.segmentation.observation import (
     motion_posterior,
     observe,
 )
+from riseg_drake.segmentation.recognition import RecognitionParameters
 from riseg_drake.segmentation.slides import slides
 from tests.segmentation.drawn_scene import (
     Blank,
@@ -70,7 +71,10 @@ def in_motion(problem: SearchProblem, known_K: np.ndarray) -> np.ndarray:
 class Moved:
     """Boxes before and after some of them have moved, with sensor noise."""
 
-    def __init__(self, after: dict[int, tuple[float, float, float]], textures: list | None = None):
+    def __init__(
+        self, after: dict[int, tuple[float, float, float]], textures: list | None = None, recognised: int = 6
+    ):
+        self.parameters = MotionSearchParameters(recognition=RecognitionParameters(most=recognised))
         scene = DrawnScene(SIZES, textures=textures or [])
         poses = [planar(*after[k]) if k in after else X for k, X in enumerate(PLACES)]
         pair, self.label, label_1 = scene.pair((OVER, OVER), (PLACES, poses), np.random.default_rng(0))
@@ -90,7 +94,7 @@ class Moved:
             self.above,
             np.vstack([self.belief.part[None], self.belief.finer]),
             parameters.motion_cost,
-            MotionSearchParameters(),
+            self.parameters,
             parameters.likelihood,
             BeliefParameters().partition.area_min,
         )
@@ -128,9 +132,11 @@ def test_where_nothing_moved_nothing_is_found():
 
 @pytest.mark.renders
 def test_what_was_seen_in_motion_is_taken_where_the_search_does_not_reach():
-    moved = Moved({0: (-0.08, 0.1, 0.9)})
+    moved = Moved({0: (-0.08, 0.1, 0.9)}, recognised=0)
     assert moved.error(0, np.array([np.eye(4), *moved.search()])) > 5
     assert moved.error(0, moved.search(moved.motions_K[0])) < 0.3
+    # What is recognised is found all the same.
+    assert Moved({0: (-0.08, 0.1, 0.9)}).error(0, Moved({0: (-0.08, 0.1, 0.9)}).search()) < 0.3
 
 
 @pytest.mark.renders
@@ -276,8 +282,10 @@ def test_bodies_that_no_motion_explains_are_asked_what_they_did_the_worst_first_
             taken.append((motion, patch.tolist(), distinct))
 
     monkeypatch.setattr(motion_search, "Search", Search)
+    monkeypatch.setattr(motion_search, "recognised_motions", lambda *_: [])
     problem = SimpleNamespace(
         compared=SimpleNamespace(keyframe=SimpleNamespace(count=6, area=np.ones(6))),
+        above=SimpleNamespace(mask=None),
         possible_bodies=lambda: bodies,
         pixels_min=1.0,
         gain_min=4.0,
