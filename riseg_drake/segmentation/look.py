@@ -30,7 +30,7 @@ class EvidenceParameters:
     observation: ObservationParameters = field(default_factory=ObservationParameters)
     search: MotionSearchParameters = field(default_factory=MotionSearchParameters)
     belief: BeliefParameters = field(default_factory=BeliefParameters)
-    settled: float = 1.5
+    settled: float = 2.0
     """Nats a border by which an object's outline must be better than the next best, not to be in doubt."""
     in_view: float = 0.9
     """Share of what the keyframe shows that a picture must show, too, to decide: a rest of the arm just after a

@@ -47,8 +47,11 @@ POSE_TURN, POSE_SHIFT = 1e-4, 5e-5
 class Table:
     """Things on a table that go where they are put, and Alg. 2, which watches."""
 
-    def __init__(self, models: Sequence[ObjectModel], seed: int) -> None:
+    def __init__(
+        self, models: Sequence[ObjectModel], seed: int, parameters: SegmentObjsParameters | None = None
+    ) -> None:
         """With things of some models; the seed draws noise and body frames."""
+        self._parameters = parameters or SegmentObjsParameters()
         self._camera = CameraConfig(noise=every_depth_error())
         self._things, self._seed = len(models), seed
         self._world = FilmedWorld(self._camera, seed, [PlacedObject(model, model.X_WB) for model in models])
@@ -74,7 +77,7 @@ class Table:
                 X_WC=X_WC.GetAsMatrix4() @ exp_se3(sigma * self._rng.normal(size=6)),
                 robot=np.zeros(depth.shape, bool),
             )
-            self._seen = segment_objs(self._seen, frame, DisFlow(), SegmentObjsParameters(), self._seed)
+            self._seen = segment_objs(self._seen, frame, DisFlow(), self._parameters, self._seed)
             self._frames += 1
 
     def ids(self) -> list[dict[int, float]]:
@@ -152,7 +155,9 @@ def split(seed: int, models: Sequence[ObjectModel]) -> list[tuple[str, bool]]:
     return [(chosen[i].name, len(after[i]) == 1) for i in cut]
 
 
-def merged(seed: int, models: Sequence[ObjectModel]) -> list[tuple[str, bool]]:
+def merged(
+    seed: int, models: Sequence[ObjectModel], parameters: SegmentObjsParameters | None = None
+) -> list[tuple[str, bool]]:
     """Two things side by side, pushed as one, then each for itself: their names, and whether they are two now.
 
     Empty where the first push did not make them one.
@@ -169,7 +174,7 @@ def merged(seed: int, models: Sequence[ObjectModel]) -> list[tuple[str, bool]]:
     between = np.mean([X.translation()[:2] for X in start], axis=0)
     shift = middle - between
     start = [moved(X, 0.0, shift) for X in start]
-    table = Table([one, other], seed)
+    table = Table([one, other], seed, parameters)
     turn, way = drawn_motion(rng)
     first = [moved(X, turn, way, middle) for X in start]
     apart = [turn + rng.uniform(-TURN, TURN) for _ in range(2)]
