@@ -49,6 +49,9 @@ WITHOUT: dict[str, Switch] = {
     "any change of light costs what its factor says": {"segment.evidence.observation.likelihood.shadow": 1e9},
     "what was told apart is forgotten where it parts": {"segment.evidence.belief.told": False},
     "what came to where nothing stood has not moved": {"segment.evidence.belief.arrivals": False},
+    "what falls off a body stays what that was known to be": {"segment.evidence.belief.strangers": False},
+    "what is seen in pieces is a body each": {"segment.evidence.belief.keyframe.pieces": False},
+    "nothing is recognised": {"segment.evidence.search.recognition.most": 0},
     "alike motions count, however little is shown": {"segment.evidence.observation.touching": -2.0},
 }
 """What line 7 by evidence consists of, by what is missing."""
