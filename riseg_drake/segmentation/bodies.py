@@ -12,7 +12,13 @@ from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.belief import Belief, BeliefParameters
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.observation import Observation, ObservationParameters, evidence_of_parts
-from riseg_drake.segmentation.partition import apart, motions_of_parts, partition, with_ids
+from riseg_drake.segmentation.partition import (
+    apart,
+    motions_of_parts,
+    partition,
+    shared_area,
+    with_ids,
+)
 from riseg_drake.segmentation.propagation import UNKNOWN, carry_labels, draw_labels
 from riseg_drake.segmentation.told_apart import identity_costs, moving_apart, with_lost
 
@@ -92,8 +98,7 @@ def bodies_of(
 
 def split_off(part: NDArray[np.intp], body: NDArray[np.intp], area: NDArray[np.intp]) -> NDArray[np.bool_]:
     """[N], what is not in the largest of the parts [N] into which its body [N] falls."""
-    shared = np.zeros((int(body.max(initial=0)) + 1, int(part.max(initial=-1)) + 1))
-    np.add.at(shared, (body, part), area)
+    shared = shared_area(body, part, area, (int(body.max(initial=0)) + 1, int(part.max(initial=-1)) + 1))
     return np.asarray((body > 0) & (shared.argmax(1)[body] != part))
 
 

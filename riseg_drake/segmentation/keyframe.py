@@ -15,13 +15,13 @@ from riseg_drake.geometry.rgbd import Frame, Immutable
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.alignment import EdgePixels, edge_pixels, has_contrast
 from riseg_drake.segmentation.noise import MeasurementNoise, gray_variance
+from riseg_drake.segmentation.occlusion import with_occlusions
 from riseg_drake.segmentation.propagation import draw_labels
 from riseg_drake.segmentation.superpixels import (
     Superpixels,
     split_superpixels,
     superpixels,
     with_gaps,
-    with_occlusions,
     with_pieces,
 )
 from riseg_drake.segmentation.support import may_lie_on

@@ -27,6 +27,7 @@ from riseg_drake.segmentation.likelihood import (
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.recognition import RecognitionParameters, recognised_motions
 from riseg_drake.segmentation.slides import SlideCosts, slides
+from riseg_drake.segmentation.superpixels import label_middles
 
 
 @dataclass
@@ -167,9 +168,7 @@ class Search:
         """[N, 2], m, of each superpixel, about."""
         keyframe = self._keyframe
         label = keyframe.image_of(np.arange(keyframe.count), -1)
-        v, u = np.nonzero(label >= 0)
-        middle = [np.bincount(label[v, u], x, keyframe.count) / np.maximum(keyframe.area, 1) for x in (v, u)]
-        return np.stack(middle, axis=1) / keyframe.pixels_per_metre
+        return label_middles(label, keyframe.count) / keyframe.pixels_per_metre
 
     def take(
         self, motion: tuple[float, NDArray, Costs] | None, patch: NDArray[np.bool_], *, distinct: bool = True

@@ -16,7 +16,7 @@ from riseg_drake.segmentation.coincidence import freedoms_shown
 from riseg_drake.segmentation.keyframe import Keyframe, make_keyframe
 from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.observation import Observation
-from riseg_drake.segmentation.partition import partition
+from riseg_drake.segmentation.partition import partition, shared_area
 from riseg_drake.segmentation.propagation import UNKNOWN
 from riseg_drake.segmentation.told_apart import identity_costs
 
@@ -106,8 +106,7 @@ def completed(
     body: NDArray[np.intp], known: NDArray[np.bool_], part: NDArray[np.intp], area: NDArray[np.intp]
 ) -> NDArray[np.intp]:
     """Ids [N], of which those that were not `known` [N] before take that of most of their part."""
-    ids = np.zeros((int(part.max(initial=-1)) + 1, int(body.max(initial=0)) + 1))
-    np.add.at(ids, (part, body), area)
+    ids = shared_area(part, body, area, (int(part.max(initial=-1)) + 1, int(body.max(initial=0)) + 1))
     most = np.where(2 * ids.max(1) > ids.sum(1), ids.argmax(1), 0)
     return np.where(known | (body > 0), body, most[part])
 

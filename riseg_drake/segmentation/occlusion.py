@@ -9,12 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.segmentation.scales import LOWEST
+from riseg_drake.segmentation.superpixels import Superpixels, label_middles, with_more
 
 _FACE = 1.5
 """Sides of a superpixel from its middle within which what is in front rises: from aside its face is seen."""
 _ON_THE_WAY = (1, 2, 4, 24)
 """Into how many equal parts the way from one to the other is cut in turn: what is not behind anything is mostly
 found out by its middle."""
+
+
+def with_occlusions(
+    cut: Superpixels, height: NDArray[np.float32], table: NDArray[np.bool_], level: float
+) -> Superpixels:
+    """The superpixels, with borders between those that may be one behind what is in front of them.
+
+    `height` [H, W], m above the `table`, which is seen [H, W]; surfaces on both sides are as high as each other
+    within `level`, m.
+    """
+    pairs, width = seen_in_pieces(cut.label, height, table, level)
+    return with_more(cut, pairs, width, across=False)
 
 
 def seen_in_pieces(
@@ -33,7 +46,7 @@ def seen_in_pieces(
     """
     stands = label >= 0
     area = np.bincount(label[stands])
-    centre = np.stack([np.bincount(label[stands], at) for at in np.nonzero(stands)]) / np.maximum(area, 1)
+    middle = label_middles(label, len(area)).T
     own = np.bincount(label[stands], height[stands]) / np.maximum(area, 1)
     face = _FACE * np.sqrt(np.median(area)) if len(area) else 0.0
     highest = cv2.dilate(np.where(stands, height, 0.0), np.ones((2 * round(face) + 1,) * 2, np.uint8))
@@ -44,7 +57,7 @@ def seen_in_pieces(
     a, b = np.stack([a, b])[:, np.abs(own[a] - own[b]) < level]
     for parts in _ON_THE_WAY:
         at = (np.arange(parts) + 0.5) / parts
-        (v_a, u_a), (v_b, u_b) = centre[:, a], centre[:, b]
+        (v_a, u_a), (v_b, u_b) = middle[:, a], middle[:, b]
         v, u = (
             np.rint(p[:, None] + (q - p)[:, None] * at).astype(np.intp) for p, q in ((v_a, v_b), (u_a, u_b))
         )

@@ -145,6 +145,17 @@ def motions_of_parts(
     return worse.argmin(0)
 
 
+def shared_area(
+    one: NDArray[np.intp], other: NDArray[np.intp], area: NDArray[np.intp], shape: tuple[int, int]
+) -> NDArray[np.float64]:
+    """[I, J] = `shape`, the area that each number of `one` [N] shares with each of the `other` [N].
+
+    `area` [N], pixels of each superpixel.
+    """
+    rows, columns = shape
+    return np.asarray(np.bincount(one * columns + other, area, rows * columns), float).reshape(shape)
+
+
 def with_ids(
     part: NDArray[np.intp],
     moved: NDArray[np.bool_],

@@ -42,8 +42,8 @@ def recognised_motions(
 ) -> NDArray[np.float64]:
     """Motions [C, 4, 4] in the keyframe's camera, those that most matches agree with first."""
     keyframe, frame = compared.keyframe, compared.frame
-    outside = keyframe.image_of(np.zeros(keyframe.count, np.intp), -1) < 0
-    (p_KQ, one), (p_C1Q, other) = _described(keyframe.frame, ~outside), _described(frame, above & ~frame.robot)
+    stood = keyframe.image_of(np.ones(keyframe.count, bool))
+    (p_KQ, one), (p_C1Q, other) = _described(keyframe.frame, stood), _described(frame, above & ~frame.robot)
     none = np.empty((0, 4, 4))
     if len(one) < parameters.matches_min or len(other) < parameters.matches_min:
         return none
@@ -68,14 +68,15 @@ def recognised_motions(
 
 def _described(frame: Frame, where: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
     """Distinct places: points [F, 3] in the frame's camera, and their descriptions [F, 128]."""
+    nothing = np.empty((0, 3)), np.empty((0, 128), np.float32)
     if not where.any():
-        return np.empty((0, 3)), np.empty((0, 128), np.float32)
+        return nothing
     region = bounding_region(where)
     gray = cv2.cvtColor(frame.color[region], cv2.COLOR_RGB2GRAY)
     sift = cv2.SIFT_create(contrastThreshold=0.02)
     keypoints, described = sift.detectAndCompute(gray, np.ascontiguousarray(where[region]).view(np.uint8))
     if described is None:
-        return np.empty((0, 3)), np.empty((0, 128), np.float32)
+        return nothing
     u, v = np.rint([k.pt for k in keypoints]).astype(np.intp).T
     v, u = v + region[0].start, u + region[1].start
     depth = frame.depth[v, u]

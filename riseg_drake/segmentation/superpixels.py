@@ -11,7 +11,6 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from riseg_drake.geometry.nearest import nearest_values
-from riseg_drake.segmentation.occlusion import seen_in_pieces
 
 _HEIGHT_STEPS = 2000.0
 """Gray levels a metre of height is worth beside colour: half a millimetre is one level."""
@@ -103,16 +102,12 @@ def _with_borders(label: NDArray[np.intp], count: int) -> Superpixels:
     return Superpixels(label, count, borders, length[code], behind=touch, across=touch)
 
 
-def with_occlusions(
-    cut: Superpixels, height: NDArray[np.float32], table: NDArray[np.bool_], level: float
-) -> Superpixels:
-    """The superpixels, with borders between those that may be one behind what is in front of them.
-
-    `height` [H, W], m above the `table`, which is seen [H, W]; surfaces on both sides are as high as each other
-    within `level`, m.
-    """
-    pairs, width = seen_in_pieces(cut.label, height, table, level)
-    return _with_more(cut, pairs, width, across=False)
+def label_middles(label: NDArray[np.intp], count: int) -> NDArray[np.float64]:
+    """The middle (v, u) [N, 2], pixels, of each of `count` labels 0.. of an image [H, W]; -1 is none."""
+    at = np.nonzero(label >= 0)
+    owner = label[at]
+    sums = np.stack([np.bincount(owner, x, count) for x in at], axis=1)
+    return sums / np.maximum(np.bincount(owner, minlength=count), 1)[:, None]
 
 
 def with_gaps(cut: Superpixels, widest: float) -> Superpixels:
@@ -130,7 +125,7 @@ def with_gaps(cut: Superpixels, widest: float) -> Superpixels:
     of = np.zeros(cut.count, np.intp)
     of[cut.label[inside]] = island[inside]
     parted = of[beyond.borders[:, 0]] != of[beyond.borders[:, 1]]
-    return _with_more(cut, beyond.borders[parted], beyond.length[parted], across=True)
+    return with_more(cut, beyond.borders[parted], beyond.length[parted], across=True)
 
 
 def with_pieces(cut: Superpixels, bodies: NDArray[np.integer]) -> Superpixels:
@@ -143,7 +138,7 @@ def with_pieces(cut: Superpixels, bodies: NDArray[np.integer]) -> Superpixels:
     body = np.zeros(cut.count, np.intp)
     body[owner] = bodies[inside]
     area = np.bincount(owner, minlength=cut.count)
-    centre = np.stack([np.bincount(owner, at, cut.count) for at in np.nonzero(inside)], axis=1) / area[:, None]
+    middle = label_middles(cut.label, cut.count)
     a, b = cut.borders[body[cut.borders[:, 0]] == body[cut.borders[:, 1]]].T
     _, piece = connected_components(
         coo_array((np.ones(len(a)), (a, b)), shape=(cut.count,) * 2), directed=False
@@ -154,17 +149,17 @@ def with_pieces(cut: Superpixels, bodies: NDArray[np.integer]) -> Superpixels:
     for each in np.unique(body[body > 0]):
         pieces = np.unique(piece[body == each])
         main = pieces[size[pieces].argmax()]
-        tree, of_main = KDTree(centre[piece == main]), np.flatnonzero(piece == main)
+        tree, of_main = KDTree(middle[piece == main]), np.flatnonzero(piece == main)
         for other in pieces[pieces != main]:
             its = np.flatnonzero(piece == other)
-            distance, nearest = tree.query(centre[its])
+            distance, nearest = tree.query(middle[its])
             pair = int(its[distance.argmin()]), int(of_main[nearest[distance.argmin()]])
             pairs.append((min(pair), max(pair)))
             length.append(float(np.sqrt(size[other])))
-    return _with_more(cut, np.array(pairs, np.intp).reshape(-1, 2), np.array(length), across=False)
+    return with_more(cut, np.array(pairs, np.intp).reshape(-1, 2), np.array(length), across=False)
 
 
-def _with_more(
+def with_more(
     cut: Superpixels, pairs: NDArray[np.intp], length: NDArray[np.float64], *, across: bool
 ) -> Superpixels:
     """Borders between pairs [P, 2] beside those that are known, behind something or across a gap."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from riseg_drake.segmentation.likelihood import nats_of_parts
+from riseg_drake.segmentation.partition import shared_area
 
 
 def identity_costs(
@@ -60,8 +61,7 @@ def with_lost(
         area: [N], pixels.
         free: nats that it may cost two bodies to have one motion.
     """
-    shared = np.zeros((next_id, next_id))
-    np.add.at(shared, (following, body), area)
+    shared = shared_area(following, body, area, (next_id, next_id))
     # What is out of sight is what it was.
     is_here = shared.any(1)
     was = np.where(is_here, shared.argmax(1), np.arange(next_id))

@@ -10,6 +10,11 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from riseg_drake.geometry.camera import WHOLE, Intrinsics, Region, project, rays
 from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.segmentation.above_table import AboveTable
+from riseg_drake.segmentation.belief import Belief, BeliefParameters
+from riseg_drake.segmentation.comparison import Comparison
+from riseg_drake.segmentation.motions import flow_difference
+from riseg_drake.segmentation.next_keyframe import first_belief
+from riseg_drake.segmentation.noise import MeasurementNoise
 
 CAMERA = Intrinsics(320, 240, 308.1, 307.9, 158.2, 119.4)
 
@@ -153,6 +158,20 @@ def standing(frame: Frame, mask: NDArray[np.bool_]) -> AboveTable:
     height = np.where(mask, np.float32(0.03), np.float32(0))
     distance = float(np.median(z)) if len(z) else 1.0
     return AboveTable(mask, height, np.array([0.0, 0.0, 1.0, 0.0]), 0.002, distance)
+
+
+def first_compared(pair: FramePair, label: NDArray) -> tuple[Belief, Comparison]:
+    """What is believed of a pair's first frame, in which a label image [H, W] stands, and the pair compared."""
+    above = standing(pair.reference, label > 0)
+    belief = first_belief(pair.reference, above, MeasurementNoise(), BeliefParameters())
+    return belief, Comparison(belief.keyframe, pair.current, depth_noise=0.0023, view_error=0.01)
+
+
+def flow_error(compared: Comparison, on: NDArray[np.bool_], motion: NDArray, true: NDArray) -> float:
+    """Pixels (root mean square) by which a motion [4, 4] differs from the true one where a mask [H, W] is."""
+    edges = compared.keyframe.edges
+    v, u = edges.surface.pixel
+    return flow_difference(edges.p_C0Q[on[v, u]], motion, true, CAMERA.fx)
 
 
 def motion_seen_from(X_WC0: NDArray, X_WB0: NDArray, X_WB1: NDArray) -> NDArray:

@@ -8,7 +8,6 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from riseg_drake.segmentation import motion_search
 from riseg_drake.segmentation.belief import BeliefParameters
-from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.likelihood import LikelihoodParameters, motion_costs, unexplained_parts
 from riseg_drake.segmentation.missing_motion import Missed, missing_motion
 from riseg_drake.segmentation.motion_search import (
@@ -17,9 +16,6 @@ from riseg_drake.segmentation.motion_search import (
     SearchProblem,
     search_motions,
 )
-from riseg_drake.segmentation.motions import flow_difference
-from riseg_drake.segmentation.next_keyframe import first_belief
-from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.observation import (
     ObservationParameters,
     bond_evidence,
@@ -32,6 +28,8 @@ from tests.segmentation.drawn_scene import (
     Blank,
     DrawnScene,
     Texture,
+    first_compared,
+    flow_error,
     looking_down,
     motion_seen_from,
     planar,
@@ -79,9 +77,7 @@ class Moved:
         poses = [planar(*after[k]) if k in after else X for k, X in enumerate(PLACES)]
         pair, self.label, label_1 = scene.pair((OVER, OVER), (PLACES, poses), np.random.default_rng(0))
         self.above = standing(pair.current, label_1 > 0)
-        above = standing(pair.reference, self.label > 0)
-        self.belief = first_belief(pair.reference, above, MeasurementNoise(), BeliefParameters())
-        self.compared = Comparison(self.belief.keyframe, pair.current, DEPTH_NOISE, view_error=0.01)
+        self.belief, self.compared = first_compared(pair, self.label)
         self.motions_K = {k: motion_seen_from(OVER, PLACES[k], poses[k]) for k in after}
 
     def search(self, *proposed: np.ndarray, search=search_motions) -> np.ndarray:
@@ -101,10 +97,7 @@ class Moved:
 
     def error(self, k: int, found: np.ndarray) -> float:
         """Pixels by which the nearest found motion is wrong on a box."""
-        edges = self.belief.keyframe.edges
-        v, u = edges.surface.pixel
-        p_KQ = edges.p_C0Q[self.label[v, u] == k + 1]
-        return min(flow_difference(p_KQ, X, self.motions_K[k], 308.1) for X in found)
+        return min(flow_error(self.compared, self.label == k + 1, X, self.motions_K[k]) for X in found)
 
 
 FAR = {0: (-0.085, 0.018, 0.25), 2: (0.07, 0.04, -0.2)}

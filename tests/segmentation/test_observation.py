@@ -5,10 +5,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from riseg_drake.segmentation.belief import BeliefParameters
-from riseg_drake.segmentation.comparison import Comparison
-from riseg_drake.segmentation.next_keyframe import first_belief
-from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.observation import (
     ObservationParameters,
     _fewest_motions,
@@ -18,7 +14,7 @@ from riseg_drake.segmentation.observation import (
     motion_price,
     observe,
 )
-from tests.segmentation.drawn_scene import DrawnScene, looking_down, motion_seen_from, planar, standing
+from tests.segmentation.drawn_scene import DrawnScene, first_compared, looking_down, motion_seen_from, planar
 
 SHARE = np.array([0.8, 0.2])
 
@@ -164,10 +160,8 @@ def test_a_pixel_and_a_half_are_a_motion_unless_the_view_is_another_one(aside: f
     there = [planar(-0.0678, 0.0), places[1]]
     cameras = (looking_down(), looking_down(aside))
     pair, label, _ = scene.pair(cameras, (places, there), np.random.default_rng(0))
-    above = standing(pair.reference, label > 0)
-    belief = first_belief(pair.reference, above, MeasurementNoise(), BeliefParameters())
+    belief, compared = first_compared(pair, label)
     moved = motion_seen_from(cameras[0], places[0], there[0])
-    compared = Comparison(belief.keyframe, pair.current, depth_noise=0.0023, view_error=0.01)
     seen = observe(compared, belief.bond, belief.divisions, belief.shown, moved, ObservationParameters())
     assert (len(seen.motions_K) == 2) is is_one
 

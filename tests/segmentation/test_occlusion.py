@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from riseg_drake.segmentation.occlusion import seen_in_pieces
-from riseg_drake.segmentation.superpixels import Superpixels, superpixels, with_occlusions
+from riseg_drake.segmentation.occlusion import seen_in_pieces, with_occlusions
+from riseg_drake.segmentation.superpixels import Superpixels, superpixels
 
 LEVEL = 0.012
 

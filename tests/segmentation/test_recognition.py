@@ -6,21 +6,17 @@ from scipy.spatial.transform import Rotation
 
 from riseg_drake.geometry.se3 import exp_se3, move_points
 from riseg_drake.segmentation import recognition
-from riseg_drake.segmentation.belief import BeliefParameters
 from riseg_drake.segmentation.comparison import Comparison
-from riseg_drake.segmentation.motions import flow_difference
-from riseg_drake.segmentation.next_keyframe import first_belief
-from riseg_drake.segmentation.noise import MeasurementNoise
 from riseg_drake.segmentation.recognition import RecognitionParameters, recognised_motions
 from tests.segmentation.drawn_scene import (
-    CAMERA,
     Blank,
     DrawnScene,
     Texture,
+    first_compared,
+    flow_error,
     looking_down,
     motion_seen_from,
     planar,
-    standing,
 )
 
 SIZES = [(0.08, 0.07, 0.05), (0.07, 0.08, 0.05)]
@@ -39,20 +35,14 @@ def fallen(place: np.ndarray, tilt: float, turn: float) -> np.ndarray:
 def seen(poses: list[np.ndarray], textures: list | None = None, X_WC1: np.ndarray | None = None):
     """The boxes at their places and then at some poses: compared, and where something stands then."""
     views = (looking_down(), looking_down() if X_WC1 is None else X_WC1)
-    pair, label, label_1 = DrawnScene(SIZES, textures=textures or [Texture(1), Texture(2)]).pair(
-        views, (PLACES, poses), np.random.default_rng(0)
-    )
-    above = standing(pair.reference, label > 0)
-    belief = first_belief(pair.reference, above, MeasurementNoise(), BeliefParameters())
-    return Comparison(belief.keyframe, pair.current, 0.0023, view_error=0.01), label, label_1 > 0
+    scene = DrawnScene(SIZES, textures=textures or [Texture(1), Texture(2)])
+    pair, label, label_1 = scene.pair(views, (PLACES, poses), np.random.default_rng(0))
+    return first_compared(pair, label)[1], label, label_1 > 0
 
 
 def error(compared: Comparison, label: np.ndarray, k: int, pose: np.ndarray, motion: np.ndarray) -> float:
-    """Pixels (root mean square) by which a motion is wrong on a box."""
-    edges = compared.keyframe.edges
-    v, u = edges.surface.pixel
-    true = motion_seen_from(looking_down(), PLACES[k], pose)
-    return flow_difference(edges.p_C0Q[label[v, u] == k + 1], motion, true, CAMERA.fx)
+    """Pixels by which a motion is wrong on a box."""
+    return flow_error(compared, label == k + 1, motion, motion_seen_from(looking_down(), PLACES[k], pose))
 
 
 @pytest.mark.renders
