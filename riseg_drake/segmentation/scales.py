@@ -27,3 +27,5 @@ CORRELATED_GRAY = 6.0
 CORRELATED_DEPTH = 28.0
 """Pixels whose errors of depth are alike, as matching windows overlap: 4 pi sigma^2 for noise that is
 smoothed over 1.5 pixels (docs/sensing.md)."""
+EXPECTED = 2.0
+"""Squared residuals of a pixel's gray and depth, both, in variances of their noise, where a motion is right."""
