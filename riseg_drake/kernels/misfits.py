@@ -16,19 +16,27 @@ def _sinks(rises: NDArray[np.float32], pixel: NDArray[np.float32], n: int, depth
 
 @compiled()
 def _stood(
-    back: NDArray[np.float32], u: Real, v: Real, z: Real, depth_0: NDArray[np.float32], near: Real
+    back: NDArray[np.float32],
+    u: Real,
+    v: Real,
+    z: Real,
+    depth_0: NDArray[np.float32],
+    near: Real,
+    whole_0: NDArray[np.int32],
+    whole: int,
 ) -> bool:
-    """Whether what is seen at (u, v) and depth z, m, was seen there before, within `near`, m."""
+    """Whether what is seen at (u, v) and depth z, m, was seen there before, within `near`, m, and belongs to
+    another `whole`."""
     place = np.floor(u + np.float32(0.5)), np.floor(v + np.float32(0.5))
     u, v, c = placed(back, place[0], place[1], 1 / z)
     apart = nearest(depth_0, u, v) - c * z
-    return bool(-near < apart < near)
+    return bool(-near < apart < near and nearest(whole_0, u, v) != whole)
 
 
 @compiled(
     "UniTuple(float64[::1], 3)(float32[:, ::1], float32[::1], float32[::1], intp[::1], intp, float32[:, ::1],"
-    "float32[::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], float64, float64,"
-    "float64, float64, float64, float64, float64, float64)"
+    "float32[::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], int32[:, ::1],"
+    "int32[::1], float64, float64, float64, float64, float64, float64, float64, float64)"
 )
 def misfits(
     pixel: NDArray[np.float32],
@@ -42,6 +50,8 @@ def misfits(
     depth_1: NDArray[np.float32],
     back: NDArray[np.float32],
     depth_0: NDArray[np.float32],
+    whole_0: NDArray[np.int32],
+    whole: NDArray[np.int32],
     depth_noise: float,
     depth_error: float,
     certainty: float,
@@ -70,6 +80,8 @@ def misfits(
         depth_1: [H, W], m; 0 where there is none.
         back: [3, 4], as M, from the other view to this, for what stands still.
         depth_0: [H, W], of this view, m.
+        whole_0: [H, W], of this view: which number each known whole has, whose parts do not hide each other.
+        whole: [N], of each superpixel.
         depth_noise: of the difference of two depths at 1 m, m.
         depth_error: share of depth by which it errs besides.
         certainty: 1 / variance of the factor, in the measure of a superpixel's squared residuals.
@@ -78,7 +90,8 @@ def misfits(
         most: squared residuals count no more than that: beyond, they are no noise.
         expected: what a point counts that cannot be compared, or is covered.
         nearer: m; what is seen by more than that in front of a point, and by more than noise, covers it, if it
-            stood there before, and the point has not sunk by half of that: into the table, behind itself.
+            stood there before and is another thing, and the point has not sunk by half of that: into the table,
+            behind itself.
     """
     total, known, lost, covered = np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)
     before_after, before_before, of_gray = np.zeros(count), np.zeros(count), np.zeros(count)
@@ -94,7 +107,11 @@ def misfits(
         z, z_1 = c / pixel[3, n], nearest(depth_1, u, v)
         variance = (depth_noise * z * z) ** 2 + (depth_error * z) ** 2
         in_front = 0 < z_1 < z - nearer and (z_1 - z) ** 2 > most * variance
-        if in_front and _stood(back, u, v, z_1, depth_0, nearer) and not _sinks(rises, pixel, n, nearer / 2):
+        if (
+            in_front
+            and _stood(back, u, v, z_1, depth_0, nearer, whole_0, whole[p])
+            and not _sinks(rises, pixel, n, nearer / 2)
+        ):
             after[n] = np.nan
             covered[p] += 1
             total[p] += expected

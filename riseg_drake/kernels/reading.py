@@ -23,7 +23,7 @@ def between(image: NDArray[np.float32], u: Real, v: Real) -> Real:
 
 
 @compiled()
-def nearest(image: NDArray[np.float32], u: Real, v: Real) -> Real:
+def nearest(image: NDArray[np.float32] | NDArray[np.int32], u: Real, v: Real) -> Real:
     """The value of the pixel of an image [H, W] that is nearest to a place; 0 beyond its edges."""
     if not (u >= -0.5 and v >= -0.5 and u < image.shape[1] - 0.5 and v < image.shape[0] - 0.5):
         return np.float32(0)

@@ -67,6 +67,19 @@ class Comparison(Immutable):
     view_error: float
     """Share of the camera's motion, pixels, and of depth from another view, by which what stands still seems to
     have moved."""
+    body: NDArray[np.intp] | None = None
+    """[N], ids, 0 where nothing has moved yet, as in all of them if it is None."""
+
+    @cached_property
+    def whole(self) -> NDArray[np.int32]:
+        """[N], the same number for superpixels that are known to be one body, and so do not hide each other."""
+        own = -1 - np.arange(self.keyframe.count)
+        return (own if self.body is None else np.where(self.body > 0, self.body, own)).astype(np.int32)
+
+    @cached_property
+    def whole_image(self) -> NDArray[np.int32]:
+        """[H, W] of the keyframe, the same; 0 where nothing stands."""
+        return self.keyframe.image_of(self.whole)
 
     @property
     def pair(self) -> FramePair:

@@ -14,12 +14,10 @@ from riseg_drake.kernels.misfits import misfits
 from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.expected_flow import of_pixels, pixel_projection
 from riseg_drake.segmentation.keyframe import Keyframe
-from riseg_drake.segmentation.scales import CORRELATED_DEPTH, CORRELATED_GRAY, OUTLIER
+from riseg_drake.segmentation.scales import CORRELATED_DEPTH, CORRELATED_GRAY, EXPECTED, OUTLIER
 
 _SEEN = 0.25
 """Pixels of motion that an image shows."""
-EXPECTED = 2.0
-"""Squared residuals of gray and depth, both, where a motion is right."""
 _NEARER = 0.01
 """m; what is seen so much in front of a point is something else."""
 
@@ -199,6 +197,8 @@ def _misfit(
         frame.unhidden_depth,
         compared.back,
         keyframe.frame.depth,
+        compared.whole_image,
+        compared.whole,
         float(np.sqrt(2)) * compared.depth_noise,
         compared.depth_error,
         parameters.correlated_gray / light**2,

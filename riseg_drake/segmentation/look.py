@@ -43,6 +43,9 @@ class EvidenceParameters:
     sharply."""
     uncovered: float = 0.3
     """Share of what stands there that the keyframe does not show, from which the view needs another."""
+    fresh: float = 0.5
+    """Share of a frame in motion in the running mean of their evidence, so that no single one parts a body or
+    joins two; 1: each for itself."""
     search_every: float = 0.13
     """s between two frames in motion in which a motion is looked for that no group proposes: what is blank."""
     memory: bool = True
@@ -116,4 +119,5 @@ def _compared(
         frame,
         depth_noise=max(above.depth_noise, keyframe.above.depth_noise),
         view_error=now.view_error.share(parameters.observation.likelihood.view_error),
+        body=None if now.belief is None else now.belief.body,
     )

@@ -52,6 +52,17 @@ def test_from_100_pixels_on_it_is_another_view_and_no_more_than_that(keyframe: K
     assert compared.another_view == 1.0
 
 
+def test_superpixels_of_a_known_body_are_one_whole_and_all_others_each_its_own(keyframe: Keyframe) -> None:
+    body = np.zeros(keyframe.count, int)
+    body[[1, 3]], body[2] = 7, 9
+    known, unknown = (Comparison(keyframe, over(0.0), 0.0023, 0.01, body=ids) for ids in (body, None))
+    assert known.whole[:5].tolist() == [-1, 7, 9, 7, -5]
+    assert unknown.whole[:5].tolist() == [-1, -2, -3, -4, -5]
+    number = keyframe.image_of(np.arange(1, keyframe.count + 1))
+    np.testing.assert_array_equal(known.whole_image[number == 4], 7)
+    np.testing.assert_array_equal(known.whole_image[number == 0], 0)
+
+
 def test_without_pairs_it_is_what_is_assumed() -> None:
     assert ViewError().share(0.01) == pytest.approx(0.01)
 
