@@ -39,6 +39,9 @@ class Bodies(Immutable):
     next_id: int
     told: NDArray[np.float64]
     """[I, I], nats that speak against two ids' being one body (`told_apart`)."""
+    latest: NDArray[np.intp]
+    """[N], the id that each has had last since the keyframe, 0 = none: what seems to stand still for a moment,
+    as its motion was not found, gets it back."""
 
     def seen_from(self, X_NK: NDArray[np.float64]) -> "Bodies":
         """The same with motions as a camera N sees them, in which the keyframe's has the pose X_NK [4, 4]."""
@@ -48,7 +51,7 @@ class Bodies(Immutable):
 def standing(belief: Belief) -> Bodies:
     """The bodies where nothing has moved since the keyframe."""
     still = np.zeros(belief.keyframe.count, np.intp)
-    return Bodies(belief.body, still, np.eye(4)[None], belief.next_id, belief.told)
+    return Bodies(belief.body, still, np.eye(4)[None], belief.next_id, belief.told, belief.body)
 
 
 def bodies_of(
@@ -60,7 +63,7 @@ def bodies_of(
 ) -> tuple[Observation, Bodies]:
     """The bodies, with what one frame says, and that with what the bodies' motions add to its evidence.
 
-    Ids are those of the belief, and for what it did not know those of the frame before. A body that no one
+    Ids are those of the belief, and for what it did not know those of the frames before. A body that no one
     motion explains falls apart for it, and what falls off it is no more what that was known to be.
     """
     keyframe = belief.keyframe
@@ -86,14 +89,15 @@ def bodies_of(
     motion = motions_of_parts(part, seen.nats, parameters.partition)
     found_before = np.bincount(part, keyframe.area * (belief.body > 0), len(motion))
     moved = (motion > 0) | (2 * found_before > np.bincount(part, keyframe.area, len(motion)))
-    previous = [belief.body] if before is None else [belief.body, before.body]
-    # What was found in motion and is gone leaves no gap in the numbers.
-    next_id = max(belief.next_id, 0 if before is None else int(before.body.max(initial=0)) + 1)
+    latest = belief.body if before is None else before.latest
+    previous = [belief.body, latest] if before is None else [belief.body, before.body, latest]
+    next_id = max(belief.next_id, int(latest.max(initial=0)) + 1)
     body, next_id = with_ids(part, moved, keyframe.area, previous, next_id)
     free = parameters.partition.rigid_min
     told = with_lost(told, belief.body, body, next_id, seen.nats, keyframe.area, free)
     told = told if parameters.told else np.zeros_like(told)
-    return seen, Bodies(body, motion[part], seen.motions_K, next_id, told)
+    latest = np.where(body > 0, body, latest)
+    return seen, Bodies(body, motion[part], seen.motions_K, next_id, told, latest)
 
 
 def split_off(part: NDArray[np.intp], body: NDArray[np.intp], area: NDArray[np.intp]) -> NDArray[np.bool_]:
@@ -166,4 +170,4 @@ def rebased(then: Bodies, now: Bodies, old: Keyframe, following: Belief) -> Bodi
         motion[following.body == a] = len(motions)
         since = then.motions_K[k] @ inverse(now.motions_K[now.motion[mine][0]])
         motions.append(seen_from(X_NO, since))
-    return Bodies(following.body, motion, np.array(motions), following.next_id, following.told)
+    return Bodies(following.body, motion, np.array(motions), following.next_id, following.told, following.body)

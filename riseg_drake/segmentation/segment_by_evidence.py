@@ -105,7 +105,8 @@ def segment_by_evidence(
         now = replace(now, searched=frame.time, missed=missed)
         candidates_N = np.concatenate([candidates_N, missing_N])
     if len(candidates_N) and not deciding:
-        seen, bodies = _explained(belief, compared, candidates_N, bodies, parameters)
+        seen, bodies = _explained(belief, compared, candidates_N, bodies, parameters, now)
+        now = replace(now, said=seen.evidence)
         deciding = has_gone_far(now, look, seen, bodies)
     # What the next keyframe cannot be compared with any more is looked for now.
     leaves = bool(above_1.mask.any()) and leaves_keyframe(now, bodies, look)
@@ -170,10 +171,14 @@ def _explained(
     candidates_N: NDArray[np.float64],
     before: Bodies,
     parameters: EvidenceParameters,
+    in_motion: Segmentation | None = None,
 ) -> tuple[Observation, Bodies]:
     """What a frame says, given some motions [C, 4, 4] as the camera that it is compared with sees them, and the
-    bodies by it."""
+    bodies by it; of one in motion, with what those before it have said."""
     seen = observe(compared, belief.bond, belief.divisions, belief.shown, candidates_N, parameters.observation)
+    if in_motion is not None and in_motion.said is not None:
+        mean = parameters.fresh * seen.evidence + (1 - parameters.fresh) * in_motion.said
+        seen = replace(seen, evidence=mean)
     X_KN = inverse(belief.keyframe.frame.X_WC) @ compared.keyframe.frame.X_WC
     seen = replace(seen, motions_K=seen_from(X_KN, seen.motions_K))
     return bodies_of(belief, seen, before, parameters.belief, parameters.observation)
@@ -249,6 +254,7 @@ def _carried(
         margins=sure,
         belief=following,
         views=_views(following, look),
+        said=None,
         missed=Missed(),
         bodies=since,
         memory=memory,

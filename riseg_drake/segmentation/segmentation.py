@@ -44,6 +44,9 @@ class Segmentation(Immutable):
     """s; None while something moves."""
     decided: bool = True
     """Whether the present rest has been looked at."""
+    said: NDArray[np.float64] | None = None
+    """[M], the running mean of the evidence that frames in motion have for the keyframe's borders; None before
+    the first."""
     searched: float = float("-inf")
     """s; when a motion that nothing proposed was looked for."""
     missed: Missed = field(default_factory=Missed)

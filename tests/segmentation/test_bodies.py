@@ -23,8 +23,9 @@ def test_how_bodies_had_moved_when_the_reference_was_taken_is_told_since_the_new
     X_WB = [exp_se3(0.1 * rng.normal(size=6)) for _ in range(3)]
     since_old = [inverse(X_WO) @ X @ inverse(X_WB[0]) @ X_WO for X in X_WB]
     body = np.array([4, 4, 7])
-    then = Bodies(body, np.array([1, 1, 0]), np.array([np.eye(4), since_old[1]]), 8, np.zeros((8, 8)))
-    now = Bodies(body, np.array([1, 1, 0]), np.array([np.eye(4), since_old[2]]), 8, np.zeros((8, 8)))
+    motion, told_apart = np.array([1, 1, 0]), np.zeros((8, 8))
+    then = Bodies(body, motion, np.array([np.eye(4), since_old[1]]), 8, told_apart, body)
+    now = Bodies(body, motion, np.array([np.eye(4), since_old[2]]), 8, told_apart, body)
     old = SimpleNamespace(frame=SimpleNamespace(X_WC=X_WO), area=np.array([5, 5, 5]))
     new = SimpleNamespace(frame=SimpleNamespace(X_WC=X_WN), count=4)
     following = SimpleNamespace(keyframe=new, body=np.array([7, 4, 0, 4]), next_id=8, told=np.zeros((8, 8)))
@@ -90,17 +91,21 @@ def test_what_has_moved_before_by_more_than_half_of_its_area_is_a_body_though_it
 
 
 @pytest.mark.parametrize(
-    ("before", "next_id", "ids", "following"),
+    ("before", "latest", "next_id", "ids", "following"),
     [
-        ([5, 5, 0, 0], 3, [5, 5, 0, 0], 6),  # it is what it was in the frame before
-        ([0, 0, 0, 7], 3, [8, 8, 0, 0], 9),  # 7 is gone, and nobody else's
-        ([0, 0, 0, 7], 9, [9, 9, 0, 0], 10),
+        ([5, 5, 0, 0], [5, 5, 0, 0], 3, [5, 5, 0, 0], 6),  # it is what it was in the frame before
+        ([0, 0, 0, 7], [0, 0, 0, 7], 3, [8, 8, 0, 0], 9),  # 7 is gone, and nobody else's
+        ([0, 0, 0, 7], [0, 0, 0, 7], 9, [9, 9, 0, 0], 10),
+        ([0, 0, 0, 0], [5, 0, 0, 7], 3, [5, 5, 0, 0], 8),  # it was not seen to move in the frame before
+        ([6, 0, 0, 0], [6, 5, 0, 0], 3, [6, 6, 0, 0], 7),  # the frame before comes first
     ],
 )
-def test_ids_are_those_of_the_frame_before_and_new_ones_nobodys(before, next_id, ids, following):
-    before = Bodies(np.array(before), np.zeros(4, int), STILL_AND_MOVED, 99, np.zeros((99, 99)))
+def test_ids_are_those_of_the_frames_before_and_new_ones_nobodys(before, latest, next_id, ids, following):
+    before, latest = np.array(before), np.array(latest)
+    before = Bodies(before, np.zeros(4, int), STILL_AND_MOVED, 99, np.zeros((99, 99)), latest)
     _, bodies = told(*a_row_of_four([0, 0, 0, 0], next_id), before)
     assert (bodies.body.tolist(), bodies.next_id) == (ids, following)
+    assert bodies.latest.tolist() == np.where(np.array(ids) > 0, ids, latest).tolist()
 
 
 def test_across_a_gap_all_of_both_parts_says_what_they_are_and_elsewhere_each_superpixel(monkeypatch):

@@ -47,7 +47,8 @@ class Pushed:
         self.first = np.array([np.mean(label[owner == s] == 1) > 0.5 for s in range(keyframe.count)])
         body = self.first.astype(np.intp)
         self.X_before, self.X_now = (motion_seen_from(OVER, PLACES[0], X) for X in (BEFORE, now))
-        self.before = Bodies(body, body, np.array([np.eye(4), self.X_before]), 2, np.zeros((2, 2)))
+        motions_K = np.array([np.eye(4), self.X_before])
+        self.before = Bodies(body, body, motions_K, 2, np.zeros((2, 2)), body)
 
     def candidates(self, groups: BFIFGroups, before: Bodies | None = None) -> np.ndarray:
         keyframe = self.belief.keyframe

@@ -34,7 +34,7 @@ def bodies(key, ids, *motions_W):
     """Ids of both superpixels, and the motion of each in W since a keyframe."""
     X_WK = key.frame.X_WC
     motions_K = np.array([STILL, *(inverse(X_WK) @ X @ X_WK for X in motions_W)])
-    return Bodies(np.array(ids), np.array([1, 2]), motions_K, 3, np.zeros((3, 3)))
+    return Bodies(np.array(ids), np.array([1, 2]), motions_K, 3, np.zeros((3, 3)), np.array(ids))
 
 
 def segmentation(number, key, by_frame, label=0):

@@ -62,7 +62,8 @@ def test_a_new_keyframe_knows_its_superpixels_by_what_the_old_ones_carry_and_wha
         np.full(3, 3.0),
         np.arange(3)[None],
     )
-    bodies = Bodies(np.array([5, 0, 6]), np.array([1, 0, 1]), STILL_AND_MOVED, 8, np.zeros((8, 8)))
+    ids = np.array([5, 0, 6])
+    bodies = Bodies(ids, np.array([1, 0, 1]), STILL_AND_MOVED, 8, np.zeros((8, 8)), ids)
     new = SimpleNamespace(
         superpixels=SimpleNamespace(label=np.tile(np.arange(4), (2, 1))),
         region=(slice(0, 2), slice(0, 4)),

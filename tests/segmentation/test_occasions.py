@@ -27,7 +27,8 @@ def leaves(keyframe, now, motions_K=NOTHING, still_since=1.0):
     covered[above_K.mask] = True
     view = SimpleNamespace(frame=frame_K, above=above_K, covered=covered)
     motions = np.concatenate([np.eye(4)[None], motions_K])
-    bodies = Bodies(np.zeros(0, int), np.zeros(0, int), motions, 1, np.zeros((1, 1)))
+    nothing = np.zeros(0, int)
+    bodies = Bodies(nothing, nothing, motions, 1, np.zeros((1, 1)), nothing)
     seen = SimpleNamespace(views=(view,), still_since=still_since)
     look = SimpleNamespace(frame=frame, above=above, parameters=EvidenceParameters())
     return leaves_keyframe(seen, bodies, look)

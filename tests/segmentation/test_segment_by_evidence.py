@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from riseg_drake.segmentation import segment_by_evidence as module
 from riseg_drake.segmentation.algorithm import SegmentObjsParameters
+from riseg_drake.segmentation.segment import SegmentParameters
 from tests.segmentation.drawn_scene import (
     Blank,
     DrawnScene,
@@ -52,6 +54,42 @@ def test_before_a_still_camera_what_went_far_is_decided_and_the_frame_becomes_th
     assert intersection_over_union(answers[-1].mask == only, truths[-1] == 1) > 0.95
     assert answers[-1].object_ids == (only,)
     assert set(answers[-1].confidence) == {only}
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize("fresh", [0.5, 0.8])
+def test_a_frame_in_motion_adds_to_the_running_mean_of_evidence_and_a_new_keyframe_begins_anew(
+    pushed, monkeypatch, fresh: float
+) -> None:
+    own, judged = [], []
+    observe, bodies_of = module.observe, module.bodies_of
+
+    def observed(*arguments):
+        own.append(observe(*arguments))
+        return own[-1]
+
+    def made_of(belief, seen, *arguments):
+        judged.append(seen.evidence)
+        return bodies_of(belief, seen, *arguments)
+
+    monkeypatch.setattr(module, "observe", observed)
+    monkeypatch.setattr(module, "bodies_of", made_of)
+    watcher, earlier, told = Watcher(segment=SegmentParameters()), None, 0
+    watcher.parameters.segment.evidence.fresh = fresh
+    for frame, _ in [*pushed, *resting(pushed)]:
+        own.clear(), judged.clear()
+        segmentation = watcher.take(frame).segmentation
+        if segmentation.belief.keyframe.frame.sequence == frame.sequence:
+            # The last in motion, and the one that decides, which counts for itself.
+            for one, other in list(zip(own, judged, strict=True))[1:]:
+                np.testing.assert_array_equal(one.evidence, other)
+            assert segmentation.said is None
+            earlier = None
+        elif judged:
+            mean = own[0].evidence if earlier is None else fresh * own[0].evidence + (1 - fresh) * earlier
+            np.testing.assert_allclose(judged[0], mean, atol=1e-12)
+            earlier, told = segmentation.said, told + 1
+    assert told > 10
 
 
 @pytest.mark.renders
