@@ -239,7 +239,12 @@ _FITS: dict[Any, typing.Callable[[yaml.ScalarNode], bool]] = {
     float: _is_number,
     str: lambda node: node.tag.endswith(":str"),
 }
-_WORDS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
+_WORDS = {
+    bool: "true or false",
+    int: "a whole number",
+    float: "a number",
+    str: "a text (a number is one in quotes)",
+}
 
 
 def _said(node: yaml.Node) -> str:

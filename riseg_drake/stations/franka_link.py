@@ -215,9 +215,10 @@ def _library(robot: str) -> Any:
         return import_module(_MODULES[robot])
     except ImportError:
         python = " with Python 3.11 or 3.12, for which alone there is one" if robot == "fr3" else ""
+        other = {"fr3": "panda", "panda": "fr3"}[robot]
         raise LinkError(
             f"station.panda.robot is {robot}, which needs {PACKAGES[robot]}: "
-            f"pip install 'riseg-drake[{robot}]'{python}"
+            f"pip install 'riseg-drake[{robot}]'{python}; or set station.panda.robot: {other}"
         ) from None
 
 

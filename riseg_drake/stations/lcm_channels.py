@@ -1,7 +1,9 @@
 """Where the drivers of the Panda and of the RealSense camera speak: LCM network, channels, buffers."""
 
 from dataclasses import dataclass
+from ipaddress import IPv4Address
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from pydrake.lcm import DrakeLcm
 
@@ -61,10 +63,20 @@ class LcmError(RuntimeError):
 
 def open_lcm(config: LcmConfig) -> DrakeLcm:
     """A connection of its own to the network; one thread at a time may use it. Raises LcmError."""
-    # LCM itself prints a line for a kind that it does not know, and then does nothing, without an error.
-    if config.url.partition("://")[0] not in _KINDS:
+    # LCM itself prints a line for what it does not know, raises nothing, and is deaf and mute from then on.
+    if not _is_network(config.url):
         raise LcmError(f"no LCM at {config.url!r}; expected a URL such as {LcmConfig.url!r}")
     return DrakeLcm(config.url)
+
+
+def _is_network(url: str) -> bool:
+    """Whether LCM knows the kind, and a group of hosts that hear each other has such an address."""
+    try:
+        parts = urlsplit(url)
+        group = parts.hostname is None or IPv4Address(parts.hostname).is_multicast
+        return parts.scheme in _KINDS and parts.port != 0 and (parts.scheme != "udpm" or group)
+    except ValueError:
+        return False
 
 
 def receive_buffer_wanted(url: str) -> int:

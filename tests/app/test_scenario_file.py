@@ -55,7 +55,7 @@ def test_an_empty_file_is_all_defaults(text):
         ("camera: {rate: .nan}", "scene.yaml: line 1: camera.rate must be a number, not '.nan'"),
         ("objects: 4.5", "scene.yaml: line 1: objects must be a whole number, not '4.5'"),
         ("camera: {noise: 1}", "scene.yaml: line 1: camera.noise must be true or false, not '1'"),
-        ("name: 3", "scene.yaml: line 1: name must be a text, not '3'"),
+        ("name: 3", "scene.yaml: line 1: name must be a text (a number is one in quotes), not '3'"),
         ("centre: 3", "scene.yaml: line 1: centre must be a list, such as [1, 2], not '3'"),
         ("centre: [1, x]", "scene.yaml: line 1: centre[1] must be a number, not 'x'"),
         ("camera: 3", "scene.yaml: line 1: camera must be a block of keys (rate, noise), not '3'"),

@@ -264,8 +264,10 @@ def test_a_library_that_is_missing_is_told_with_the_line_that_installs_it(robot,
     with pytest.raises(LinkError) as caught:
         FrankaLink(robot, "127.0.0.1")
     python = {"fr3": " with Python 3.11 or 3.12, for which alone there is one", "panda": ""}[robot]
+    other = {"fr3": "panda", "panda": "fr3"}[robot]
     assert str(caught.value) == (
-        f"station.panda.robot is {robot}, which needs {package}: pip install 'riseg-drake[{robot}]'{python}"
+        f"station.panda.robot is {robot}, which needs {package}: pip install 'riseg-drake[{robot}]'{python}; "
+        f"or set station.panda.robot: {other}"
     )
 
 

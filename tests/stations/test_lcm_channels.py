@@ -1,4 +1,5 @@
 import pytest
+from pydrake.lcm import DrakeLcm
 
 from riseg_drake.stations.lcm_channels import (
     RECEIVE_LIMIT,
@@ -40,7 +41,22 @@ def test_networks_without_such_buffers_are_not_judged(tmp_path):
     assert receive_buffer_warning(LcmConfig.url, tmp_path / "nothing") == ""
 
 
-def test_a_url_that_lcm_refuses_is_said_in_one_line():
-    with pytest.raises(LcmError, match="no LCM at 'nonsense://'") as caught:
-        open_lcm(LcmConfig(url="nonsense://"))
+@pytest.mark.parametrize(
+    "url",
+    [
+        "nonsense://",
+        "udpm://nonsense:7667?ttl=0",
+        "udpm://127.0.0.1:7667?ttl=0",  # no group: nobody else would hear
+        "udpm://239.255.76.67:port?ttl=0",
+        "udpm://239.255.76.67:99999",
+    ],
+)
+def test_a_url_that_lcm_refuses_is_said_in_one_line(url):
+    with pytest.raises(LcmError, match=r"no LCM at '.*'; expected a URL such as 'udpm://239") as caught:
+        open_lcm(LcmConfig(url=url))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("url", [LcmConfig.url, "udpm://", "udpm://239.255.76.67:7667", "memq://"])
+def test_any_other_url_is_left_to_lcm(url):
+    assert isinstance(open_lcm(LcmConfig(url=url)), DrakeLcm)

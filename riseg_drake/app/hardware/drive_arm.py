@@ -44,6 +44,8 @@ def drive_arm_command(request: DriveRequest, console: Console) -> None:
     """Drive the arm until Ctrl-C, or only look at it. Raises LinkError, LcmError, ScenarioError."""
     config = load_scenario(request.scenario, HARDWARE).hardware
     robot, mode = config.panda.robot, request.mode or config.command.mode
+    network = open_lcm(config.lcm)
+    console.print(f"drive-arm: connecting to {request.ip}; where nobody answers, that takes up to two minutes")
     link = FrankaLink(robot, request.ip)
     if request.check:
         checks = Checks(link, config.panda, X_WC=config.camera.fixed_pose)
@@ -57,7 +59,6 @@ def drive_arm_command(request: DriveRequest, console: Console) -> None:
     except RobotStopped as stopped:
         console.print(f"forces of its reflexes were not set: {stopped}")
     drive = ArmDrive(mode == VELOCITY, config.panda.limits)
-    network = open_lcm(config.lcm)
     tell = lambda line: console.print(f"drive-arm: {line}")  # noqa: E731
     process = DriveProcess(link, network, config.lcm, drive, tell)
     console.print(

@@ -52,7 +52,8 @@ class Film:
 
     def __init__(self, path: Path):
         if path.suffix not in SUFFIXES or not path.is_file():
-            raise RecordingError(f"{path} is no file with {' or '.join(SUFFIXES)}")
+            is_no = "no file with" if path.exists() else "not there; expected a file with"
+            raise RecordingError(f"{path} is {is_no} {' or '.join(SUFFIXES)}")
         self._reader = BagReader(path, SourceOptions())
         self.name, self.serial = path.name, ""
         if (found := self._reader.registration).depth is not None:

@@ -109,7 +109,10 @@ def test_the_printed_lines_are_the_scenario_of_that_camera():
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("none.bag", "is no file with .bag or .db3 or .mcap"), ("text.db3", "no bag that can be read")],
+    [
+        ("none.bag", "is not there; expected a file with .bag or .db3 or .mcap"),
+        ("text.db3", "no bag that can be read"),
+    ],
 )
 def test_what_is_no_recording_is_said_in_one_line(tmp_path, capsys, name, words):
     (tmp_path / "text.db3").write_text("a text")
