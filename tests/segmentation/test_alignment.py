@@ -9,7 +9,7 @@ import pytest
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import Frame, FramePair
 from riseg_drake.geometry.se3 import exp_se3, translation
-from riseg_drake.segmentation.alignment import AlignmentParameters, align_motions, rigid_fit
+from riseg_drake.segmentation.alignment import AlignmentParameters, align_motions
 from riseg_drake.segmentation.keyframe import KeyframeParameters, make_keyframe
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.noise import MeasurementNoise
@@ -101,19 +101,3 @@ def test_without_rounds_motions_stay_as_the_body_frames_have_them() -> None:
     moved = Moved([Texture(1), Texture(2)])
     start = moved.nearly(0.02)
     np.testing.assert_array_equal(moved.aligned(start, parameters=AlignmentParameters(rounds=0))[0], start)
-
-
-def test_what_a_motion_hides_costs_twice_what_is_right_and_what_has_no_depth_as_much_as_that() -> None:
-    moved = Moved([Texture(1), Texture(2)])
-    first = moved.edges.subset(np.flatnonzero(moved.edges.p_C0Q[:, 0] < 0))
-    current, nowhere = moved.pair.current, np.ones(CAMERA.shape, bool)
-
-    def cost(frame: Frame, motion: np.ndarray) -> np.ndarray:
-        fit = rigid_fit(replace(moved.pair, current=frame), DEPTH_NOISE)
-        return fit.cost(first, motion)
-
-    np.testing.assert_array_equal(cost(replace(current, robot=nowhere), moved.motion_C0), 4.0)
-    np.testing.assert_array_equal(cost(current, translation(np.array([5.0, 0, 0]))), 4.0)
-    no_depth = replace(current, depth=np.zeros_like(current.depth))
-    np.testing.assert_array_equal(cost(no_depth, moved.motion_C0), 2.0)
-    assert cost(current, moved.motion_C0).mean() < 2.5
