@@ -45,7 +45,7 @@ def drive_arm_command(request: DriveRequest, console: Console) -> None:
     config = load_scenario(request.scenario, HARDWARE).hardware
     robot, mode = config.panda.robot, request.mode or config.command.mode
     network = open_lcm(config.lcm)
-    console.print(f"drive-arm: connecting to {request.ip}; where nobody answers, that takes up to two minutes")
+    console.print(f"drive-arm: connecting to {request.ip}; where nobody answers, that takes a minute")
     link = FrankaLink(robot, request.ip)
     if request.check:
         checks = Checks(link, config.panda, X_WC=config.camera.fixed_pose)

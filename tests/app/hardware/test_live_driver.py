@@ -128,7 +128,8 @@ def test_a_live_driver_connects_holds_tells_a_reflex_by_name_and_recovers_at_the
             driver.communicate()
     assert driver.returncode == 0, err
     lines = out.splitlines()
-    assert lines[0].startswith(f"drive-arm: fr3 at {server.address}, commands of position")
+    assert lines[0].startswith(f"drive-arm: connecting to {server.address}; ")
+    assert lines[1].startswith(f"drive-arm: fr3 at {server.address}, commands of position")
     stopped = [line.startswith(f"{STOPPED}: joint_velocity_violation") for line in lines]
     assert RECOVERING in lines[stopped.index(True) + 1 :]
     assert 1 <= lines.count(RECOVERING) <= client.words
