@@ -20,7 +20,7 @@ from riseg_drake.kernels.screw import screwed
 from riseg_drake.segmentation.expected_flow import pixel_projection
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.noise import MeasurementNoise, depth_sigma
-from riseg_drake.segmentation.scales import EXPECTED, OUTLIER, SAME_MOTION
+from riseg_drake.segmentation.scales import EXPECTED, HIDDEN, OUTLIER, SAME_MOTION
 from riseg_drake.segmentation.surface import SurfacePixels, seek, surface_pixels
 
 _GRADIENT_MIN = 1.0
@@ -28,8 +28,6 @@ _GRADIENT_MIN = 1.0
 _CORRELATED = 6.0
 """Noise of depth is alike in about so many pixels along a line, the root of `CORRELATED_DEPTH`; they count as
 one."""
-_HIDDEN = 2.0
-"""Times what a pixel costs where a motion is right, where one hides it (`LikelihoodParameters.hidden`)."""
 _GRID = 4
 """Pixels between those without a gradient, whose noise of depth is hardly correlated."""
 
@@ -174,9 +172,9 @@ class RigidFit:
         gray = np.square(sought.read_between(self.gray) - edges.gray) / edges.variance
         depth = np.square((z_1 - sought.depth) / depth_sigma(sought.depth, self.depth_noise))
         squared = np.minimum(gray, np.float32(OUTLIER)) + np.minimum(depth, np.float32(OUTLIER))
-        # Depth that is not there says neither; few things go just where nobody can see them.
+        # Depth that is not there says neither.
         squared = np.where(z_1 > 0, squared, np.float32(EXPECTED))
-        return np.where(np.isnan(gray), np.float32(_HIDDEN * EXPECTED), squared)
+        return np.where(np.isnan(gray), np.float32((1 + HIDDEN) * EXPECTED), squared)
 
     def align(
         self, edges: EdgePixels, motion: NDArray, rounds: int, parameters: AlignmentParameters

@@ -57,7 +57,7 @@ def standing(belief: Belief) -> Bodies:
 def bodies_of(
     belief: Belief,
     seen: Observation,
-    before: Bodies | None,
+    before: Bodies,
     parameters: BeliefParameters,
     observation: ObservationParameters,
 ) -> tuple[Observation, Bodies]:
@@ -89,14 +89,13 @@ def bodies_of(
     motion = motions_of_parts(part, seen.nats, parameters.partition)
     found_before = np.bincount(part, keyframe.area * (belief.body > 0), len(motion))
     moved = (motion > 0) | (2 * found_before > np.bincount(part, keyframe.area, len(motion)))
-    latest = belief.body if before is None else before.latest
-    previous = [belief.body, latest] if before is None else [belief.body, before.body, latest]
-    next_id = max(belief.next_id, int(latest.max(initial=0)) + 1)
+    previous = [belief.body, before.body, before.latest]
+    next_id = max(belief.next_id, int(before.latest.max(initial=0)) + 1)
     body, next_id = with_ids(part, moved, keyframe.area, previous, next_id)
     free = parameters.partition.rigid_min
     told = with_lost(told, belief.body, body, next_id, seen.nats, keyframe.area, free)
     told = told if parameters.told else np.zeros_like(told)
-    latest = np.where(body > 0, body, latest)
+    latest = np.where(body > 0, body, before.latest)
     return seen, Bodies(body, motion[part], seen.motions_K, next_id, told, latest)
 
 

@@ -14,7 +14,7 @@ from riseg_drake.kernels.misfits import misfits
 from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.expected_flow import of_pixels, pixel_projection
 from riseg_drake.segmentation.keyframe import Keyframe
-from riseg_drake.segmentation.scales import CORRELATED_DEPTH, CORRELATED_GRAY, EXPECTED, OUTLIER
+from riseg_drake.segmentation.scales import CORRELATED_DEPTH, CORRELATED_GRAY, EXPECTED, HIDDEN, OUTLIER
 
 _SEEN = 0.25
 """Pixels of motion that an image shows."""
@@ -52,7 +52,7 @@ class LikelihoodParameters:
     view_errors: float = 5.0
     """So many times that depth may err, and what stands still may seem to have moved, at most: real errors have
     long tails."""
-    hidden: float = 1.0
+    hidden: float = HIDDEN
     """Times the mean squared residual that is usual, by which a hidden point is worse than one that matches:
     few things go just where nobody can see them."""
     covered: float = 0.15

@@ -114,10 +114,11 @@ def compared_at_rest(now: Segmentation, look: Look) -> Comparison:
 def _compared(
     now: Segmentation, keyframe: Keyframe, frame: Frame, above: AboveTable, parameters: EvidenceParameters
 ) -> Comparison:
+    assert now.belief is not None
     return Comparison(
         keyframe,
         frame,
         depth_noise=max(above.depth_noise, keyframe.above.depth_noise),
         view_error=now.view_error.share(parameters.observation.likelihood.view_error),
-        body=None if now.belief is None else now.belief.body,
+        body=now.belief.body,
     )

@@ -29,3 +29,6 @@ CORRELATED_DEPTH = 28.0
 smoothed over 1.5 pixels (docs/sensing.md)."""
 EXPECTED = 2.0
 """Squared residuals of a pixel's gray and depth, both, in variances of their noise, where a motion is right."""
+HIDDEN = 1.0
+"""Times `EXPECTED` or what is usual, by which a hidden pixel is worse than one that matches: few things go just
+where nobody can see them. Set by hand."""

@@ -105,7 +105,7 @@ def segment_by_evidence(
         now = replace(now, searched=frame.time, missed=missed)
         candidates_N = np.concatenate([candidates_N, missing_N])
     if len(candidates_N) and not deciding:
-        seen, bodies = _explained(belief, compared, candidates_N, bodies, parameters, now)
+        seen, bodies = _explained(belief, compared, candidates_N, bodies, parameters, now.said)
         now = replace(now, said=seen.evidence)
         deciding = has_gone_far(now, look, seen, bodies)
     # What the next keyframe cannot be compared with any more is looked for now.
@@ -171,14 +171,13 @@ def _explained(
     candidates_N: NDArray[np.float64],
     before: Bodies,
     parameters: EvidenceParameters,
-    in_motion: Segmentation | None = None,
+    said: NDArray[np.float64] | None = None,
 ) -> tuple[Observation, Bodies]:
     """What a frame says, given some motions [C, 4, 4] as the camera that it is compared with sees them, and the
-    bodies by it; of one in motion, with what those before it have said."""
+    bodies by it; of one in motion, with what those before it have `said` of the borders [M]."""
     seen = observe(compared, belief.bond, belief.divisions, belief.shown, candidates_N, parameters.observation)
-    if in_motion is not None and in_motion.said is not None:
-        mean = parameters.fresh * seen.evidence + (1 - parameters.fresh) * in_motion.said
-        seen = replace(seen, evidence=mean)
+    if said is not None:
+        seen = replace(seen, evidence=parameters.fresh * seen.evidence + (1 - parameters.fresh) * said)
     X_KN = inverse(belief.keyframe.frame.X_WC) @ compared.keyframe.frame.X_WC
     seen = replace(seen, motions_K=seen_from(X_KN, seen.motions_K))
     return bodies_of(belief, seen, before, parameters.belief, parameters.observation)

@@ -26,6 +26,7 @@ PACKAGES = {"fr3": "pylibfranka", "panda": "panda-python"}
 _MODULES = {"fr3": "pylibfranka", "panda": "panda_py.libfranka"}
 _MODES = {"Other": 0, "Idle": 1, "Move": 2, "Guiding": 3, "Reflex": 4, "UserStopped": 5}
 _RECOVERING = 6
+_OTHER = {"fr3": "panda", "panda": "fr3"}
 _SPEAKS = {"fr3": "a Franka Research 3 (server version 10)", "panda": "a Panda (server version 5)"}
 _REFLEX_FORCE, _REFLEX_TORQUE = (
     100.0,
@@ -192,7 +193,7 @@ def why_not_connected(robot: str, address: str, text: str) -> str:
     """One line on why there is no connection to `robot` at an address, from what libfranka said."""
     versions = _VERSIONS.search(text)
     if versions:
-        other = {"fr3": "panda", "panda": "fr3"}[robot]
+        other = _OTHER[robot]
         return (
             f"the robot at {address} has server version {versions[1]}, and the libfranka of {PACKAGES[robot]} "
             f"speaks version {versions[2]}: {PACKAGES[robot]} is for {_SPEAKS[robot]}; for {_SPEAKS[other]} "
@@ -215,7 +216,7 @@ def _library(robot: str) -> Any:
         return import_module(_MODULES[robot])
     except ImportError:
         python = " with Python 3.11 or 3.12, for which alone there is one" if robot == "fr3" else ""
-        other = {"fr3": "panda", "panda": "fr3"}[robot]
+        other = _OTHER[robot]
         raise LinkError(
             f"station.panda.robot is {robot}, which needs {PACKAGES[robot]}: "
             f"pip install 'riseg-drake[{robot}]'{python}; or set station.panda.robot: {other}"

@@ -9,7 +9,7 @@ import pytest
 from riseg_drake.geometry.se3 import exp_se3, inverse, translation
 from riseg_drake.segmentation import bodies as module
 from riseg_drake.segmentation.belief import Belief, BeliefParameters
-from riseg_drake.segmentation.bodies import Bodies, bodies_of, rebased
+from riseg_drake.segmentation.bodies import Bodies, bodies_of, rebased, standing
 from riseg_drake.segmentation.observation import Observation, ObservationParameters
 
 
@@ -73,7 +73,7 @@ def a_row_of_four(body, next_id=3, across=(False, False, False), area=(100, 100,
 
 
 def told(belief, seen, before=None):
-    return bodies_of(belief, seen, before, BeliefParameters(), ObservationParameters())
+    return bodies_of(belief, seen, before or standing(belief), BeliefParameters(), ObservationParameters())
 
 
 def test_what_has_no_one_motion_speaks_against_the_border_between_its_parts_by_its_length():
@@ -118,7 +118,7 @@ def test_across_a_gap_all_of_both_parts_says_what_they_are_and_elsewhere_each_su
 def test_bodies_that_have_no_one_motion_are_told_apart_by_what_that_costs_and_stay_two(remembers):
     parameters = BeliefParameters(told=remembers)
     belief, seen = a_row_of_four([1, 1, 2, 2])
-    _, bodies = bodies_of(belief, seen, None, parameters, ObservationParameters())
+    _, bodies = bodies_of(belief, seen, standing(belief), parameters, ObservationParameters())
     # One motion costs both 100 nats, of which 60 are free.
     expected = np.zeros((3, 3))
     expected[1, 2] = expected[2, 1] = 40.0 * remembers
@@ -126,7 +126,7 @@ def test_bodies_that_have_no_one_motion_are_told_apart_by_what_that_costs_and_st
     # Later a picture in which nothing moves says that all is one: 2 + 1 + 2 nats, by 10 or 20 pixels of border.
     belief = replace(belief, prior=np.array([2.0, 1.0, 2.0]), told=bodies.told)
     seen = replace(seen, nats=np.zeros((2, 4)), evidence=np.zeros(3))
-    _, bodies = bodies_of(belief, seen, None, parameters, ObservationParameters())
+    _, bodies = bodies_of(belief, seen, standing(belief), parameters, ObservationParameters())
     assert len(np.unique(bodies.body)) == 1 + remembers
 
 
@@ -138,6 +138,7 @@ def test_what_falls_off_its_body_is_no_more_held_apart_from_others_by_what_that_
     apart[1, 2] = apart[2, 1] = 90.0
     inherited = np.array([0.0, 0.0, -4.0])
     belief = replace(belief, evidence=inherited, inherited=inherited, told=apart)
-    told, bodies = bodies_of(belief, seen, None, BeliefParameters(strangers=forgets), ObservationParameters())
+    parameters = BeliefParameters(strangers=forgets)
+    told, bodies = bodies_of(belief, seen, standing(belief), parameters, ObservationParameters())
     assert bodies.body.tolist() == ([1, 1, 2, 2] if forgets else [1, 1, 3, 2])
     assert told.strangers.tolist() == [False, False, forgets, False]
