@@ -101,10 +101,7 @@ class FrankaLink:
 
     def read(self) -> RobotReading:
         """See Link. Raises LinkError."""
-        try:
-            return reading(self._robot.read_once())
-        except Exception as error:
-            raise LinkError(f"the robot says nothing any more: {told(error)}") from None
+        return reading(self._state())
 
     def control(self, is_velocity: bool, cycle: Cycle) -> None:
         """See Link. Raises RobotStopped and LinkError."""
@@ -125,9 +122,15 @@ class FrankaLink:
             raise RobotStopped(told(error)) from None
 
     def load(self) -> tuple[float, NDArray[np.float64]]:
-        """See Link."""
-        state = self._robot.read_once()
+        """See Link. Raises LinkError."""
+        state = self._state()
         return float(state.m_total), np.array(state.F_x_Ctotal, np.float64)
+
+    def _state(self) -> Any:
+        try:
+            return self._robot.read_once()
+        except Exception as error:
+            raise LinkError(f"the robot says nothing any more: {told(error)}") from None
 
     def _control_by_loop(self, is_velocity: bool, cycle: Cycle) -> None:
         robot, library = self._robot, self._library

@@ -162,8 +162,9 @@ def test_every_field_of_the_robots_state_is_read_as_libfranka_names_it(robot, li
     assert mass == 0.9
     np.testing.assert_array_equal(center, [0.1, 0.2, 0.3])
     library.ends = RuntimeError("libfranka: UDP receive: Timeout")
-    with pytest.raises(LinkError, match=r"^the robot says nothing any more: UDP receive: Timeout$"):
-        link.read()
+    for ask in (link.read, link.load):
+        with pytest.raises(LinkError, match=r"^the robot says nothing any more: UDP receive: Timeout$"):
+            ask()
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
