@@ -1,17 +1,21 @@
 """The options of the drivers, and of the camera's calibration."""
 
 import argparse
+import re
 from pathlib import Path
 
 from riseg_drake.app.options import add_scenario
 
 HARDWARE = "the built-in hardware.yaml"
+_HOST = re.compile(r"[\w.-]+")
 
 
 def add_drive_arm_options(command: argparse.ArgumentParser) -> None:
     """Which robot, and whether it is only looked at."""
     add_scenario(command, built_in=HARDWARE)
-    command.add_argument("--ip", required=True, metavar="A", help="address of the robot's control box")
+    command.add_argument(
+        "--ip", required=True, type=_host, metavar="A", help="address of the robot's control box, or its name"
+    )
     command.add_argument(
         "--mode", choices=("velocity", "position"), help="what is commanded (the scenario's: velocity)"
     )
@@ -50,7 +54,8 @@ def add_calibrate_options(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--mount",
         choices=("wrist", "world"),
-        help="camera on the wrist over a board that lies still (default), or in the world with a carried board",
+        help="camera on the wrist over a board that lies still, or in the world with a carried board (as the "
+        "scenario's station.camera.mount says)",
     )
     command.add_argument(
         "--live", action="store_true", help="take the views now, through the drivers; the arm is moved by hand"
@@ -61,3 +66,10 @@ def add_calibrate_options(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--draw", type=Path, metavar="FILE", help="only draw the board, as a PNG to be printed"
     )
+
+
+def _host(text: str) -> str:
+    """An address or a name, and nothing beside it: libfranka has a port of its own."""
+    if not _HOST.fullmatch(text):
+        raise argparse.ArgumentTypeError(f"{text!r} is no address such as 172.16.0.2, without a port")
+    return text

@@ -151,11 +151,12 @@ def _check(node: yaml.Node, schema: Any, name: str, source: str) -> None:
     where = f"{source}: line {node.start_mark.line + 1}:"
     if not node.tag.startswith(("!", "tag:yaml.org,2002:")) or node.tag.startswith(_OF_PYTHON):
         raise ScenarioError(f"{where} {name} has the unknown tag {node.tag}")
-    schema = _variant(_without_none(schema, node), node, name, where)
+    choices = _without_none(schema, node)
+    schema = _variant(choices, node, name, where)
     if schema is None:
         return
     if dataclasses.is_dataclass(schema):
-        _check_keys(node, schema, name, source, where)
+        _check_keys(node, schema, name, source, where, [c for c in typing.get_args(choices) if c is not schema])
     elif typing.get_origin(schema) is list:
         if not isinstance(node, yaml.SequenceNode):
             raise ScenarioError(f"{where} {name} must be a list, such as [1, 2], not {_said(node)}")
@@ -165,19 +166,30 @@ def _check(node: yaml.Node, schema: Any, name: str, source: str) -> None:
         raise ScenarioError(f"{where} {name} must be {_WORDS[schema]}, not {_said(node)}")
 
 
-def _check_keys(node: yaml.Node, schema: Any, name: str, source: str, where: str) -> None:
+def _check_keys(node: yaml.Node, schema: Any, name: str, source: str, where: str, others: list[Any]) -> None:
+    """The same for a dataclass's keys; `others` are what the field could be by another tag."""
     fields = typing.get_type_hints(schema)
     known = [field.name for field in dataclasses.fields(schema)]
     if not isinstance(node, yaml.MappingNode):
         raise ScenarioError(f"{where} {name} must be a block of keys ({', '.join(known)}), not {_said(node)}")
     node.value = [(k, v) for k, v in node.value if v.value not in _FORMER.get(f"{name}.{k.value}", ())]
+    seen: dict[str, int] = {}
     for index, (key_node, value_node) in enumerate(node.value):
-        key = key_node.value
+        key = str(key_node.value)  # of what is no text only what is said about it
         path = key if name == "the scenario" else f"{name}.{key}"
+        line = key_node.start_mark.line + 1
+        if key in seen:
+            raise ScenarioError(f"{source}: line {line}: {path!r} stands twice, in line {seen[key]} too")
+        seen[key] = line
         if key not in known:
-            near = difflib.get_close_matches(str(key), known, n=1)
+            for other in others:
+                if key in typing.get_type_hints(other):
+                    raise ScenarioError(
+                        f"{source}: line {line}: {path!r} is a key of !{other.__name__}, and {name} has "
+                        f"not that tag: write `{name}: !{other.__name__}`"
+                    )
+            near = difflib.get_close_matches(key, known, n=1)
             right = f"did you mean {near[0]!r}?" if near else f"the keys here are {', '.join(known)}"
-            line = key_node.start_mark.line + 1
             raise ScenarioError(f"{source}: line {line}: unknown key {path!r}; {right}")
         if fields[key] == list[str] and isinstance(value_node, yaml.ScalarNode) and _FITS[str](value_node):
             # One text stands for a list of one.

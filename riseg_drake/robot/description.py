@@ -160,6 +160,9 @@ def check_tool(description: PandaDescription, X_WC: NDArray[np.float64] | None =
     plant.Finalize()
     inspector = scene_graph.model_inspector()
     tool_shape(plant, inspector, tool.instance, tool.tip_frame, plant.world_frame(), str(file))
+    bodies = [plant.get_body(index) for index in plant.GetBodyIndices(tool.instance)]
+    if not any(plant.GetVisualGeometriesForBody(body) for body in bodies):
+        raise ToolError(f"{file}: no visual geometry; by it the tool is told from the objects in the picture")
     if X_WC is None and tool.camera_frame is None and not description.X_EC:
         raise ToolError(f"{file}: {NO_CAMERA}")
 

@@ -294,10 +294,20 @@ def observation_posture(
         leaning = ""
     if q is None:
         raise ValueError(
-            f"observe_height: no posture looks at {list(centre_W)} from {height} m{leaning}; "
-            "0.5 m above (0.5, 0) is within reach"
+            f"observe_height: no posture looks at {list(centre_W)} from {height} m{leaning}; with bar or hand "
+            f"0.5 m above (0.5, 0) is within reach. {_tool_told(kinematics)}"
         )
     return q
+
+
+def _tool_told(kinematics: PandaKinematics) -> str:
+    """Where tip and camera are, by which a tool in millimetres or a camera that looks back is known."""
+    X_EC = kinematics.X_EC
+    off = np.degrees(np.arccos(np.clip(X_EC[2, 2], -1, 1)))
+    return (
+        f"The tip is {np.linalg.norm(kinematics.X_EF[:3, 3]):.2f} m from the flange, the camera "
+        f"{np.linalg.norm(X_EC[:3, 3]):.2f} m from the tip, looking {off:.0f} degrees off the tool's direction"
+    )
 
 
 def _roomiest(

@@ -7,6 +7,7 @@ the robot and publishes. Nothing in here decides anything; that is ArmDrive's.
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 
 import numpy as np
 from drake import lcmt_panda_command
@@ -45,14 +46,14 @@ class DriveProcess:
     ):
         self._link, self._network, self._config, self._drive = link, network, config, drive
         self._tell, self._wall = tell, wall
-        self._commands: list[lcmt_panda_command] = []
-        self._words: list[lcmt_panda_command] = []
+        self._commands, self._words = list[lcmt_panda_command](), list[lcmt_panda_command]()
         self._is_ending = False
         self._recovers = False
         self._told_errors = -np.inf
         self.cycles = CycleTimes()
-        network.Subscribe(config.command_channel, lambda data: _decode(data, self._commands))
-        network.Subscribe(config.recovery_channel, lambda data: _decode(data, self._words))
+        # Not by `self`, whom the network then kept alive, beyond what Python's end can clear away.
+        network.Subscribe(config.command_channel, partial(_decode, self._commands))
+        network.Subscribe(config.recovery_channel, partial(_decode, self._words))
 
     def end(self) -> None:
         """Bring the arm to rest, and return from `run`."""
@@ -144,7 +145,7 @@ class DriveProcess:
             self._tell(line)
 
 
-def _decode(data: bytes, into: list[lcmt_panda_command]) -> None:
+def _decode(into: list[lcmt_panda_command], data: bytes) -> None:
     """LCM calls this from C, where nothing may be raised; what cannot be decoded is no command."""
     try:
         into.append(lcmt_panda_command.decode(data))

@@ -63,6 +63,8 @@ def test_an_empty_file_is_all_defaults(text):
         ("method: quick", "scene.yaml: line 1: method must be one of fast, careful, not 'quick'"),
         ("- 1", "scene.yaml: line 1: the scenario must be a block of keys"),
         ("a: [1", "scene.yaml: line 1: not YAML"),
+        ("objects: 4\n\nobjects: 5", "scene.yaml: line 3: 'objects' stands twice, in line 1 too"),
+        ("camera: {rate: 1, rate: 2}", "scene.yaml: line 1: 'camera.rate' stands twice, in line 1 too"),
     ],
 )
 def test_an_error_says_in_one_line_where_it_is_and_what_would_have_been_right(text, message):
@@ -155,7 +157,12 @@ def test_a_tag_chooses_between_kinds_and_the_first_needs_none():
     [
         ("station: !Reel {}", r"station must be one of !Drawn, !Real, not !Reel"),
         ("station: !Real {camera: {rat: 5}}", r"unknown key 'station.camera.rat'; did you mean 'rate'"),
-        ("station: {url: there}", r"unknown key 'station.url'"),
+        (
+            "station: {url: there}",
+            r"line 1: 'station.url' is a key of !Real, and station has not that tag: write `station: !Real`",
+        ),
+        ("station: !Real {seed: 3}", r"'station.seed' is a key of !Drawn"),
+        ("station: {uri: there}", r"unknown key 'station.uri'"),
     ],
 )
 def test_a_kind_is_checked_as_what_it_is(text, message):

@@ -1,13 +1,11 @@
 """Tools of somebody's own, as text: boxes and frames on a link called `base`."""
 
 
-def box(size, p, name="box"):
-    """A collision shape: sides and middle, m."""
+def box(size, p, name="box", kinds=("collision", "visual")):
+    """A shape to touch and to see: sides and middle, m."""
     x, y, z = size
-    return (
-        f'<collision name="{name}"><pose>{p[0]} {p[1]} {p[2]} 0 0 0</pose>'
-        f"<geometry><box><size>{x} {y} {z}</size></box></geometry></collision>"
-    )
+    shape = f"<pose>{p[0]} {p[1]} {p[2]} 0 0 0</pose><geometry><box><size>{x} {y} {z}</size></box></geometry>"
+    return "".join(f'<{kind} name="{name}">{shape}</{kind}>' for kind in kinds)
 
 
 def frame(name, pose):
@@ -44,6 +42,7 @@ URDF = """<robot name="own">
   <link name="base">
     <inertial><mass value="0.3"/><inertia ixx="1e-3" iyy="1e-3" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial>
     <collision><origin xyz="0 0 0.1"/><geometry><box size="0.012 0.026 0.2"/></geometry></collision>
+    <visual><origin xyz="0 0 0.1"/><geometry><box size="0.012 0.026 0.2"/></geometry></visual>
   </link>
   <link name="tip"/>
   <joint name="to_tip" type="fixed"><parent link="base"/><child link="tip"/><origin xyz="0 0 0.2"/></joint>

@@ -131,6 +131,7 @@ def test_a_file_that_is_not_there_is_named_with_what_a_tool_can_be(tmp_path):
     [
         (sdf(frames=CAMERA), "no frame `tip`"),
         (sdf(shapes=""), "no collision geometry"),
+        (sdf(shapes=box((0.012, 0.026, 0.2), (0, 0, 0.1), kinds=["collision"])), "no visual geometry"),
         (sdf(more=link("finger") + joint("prismatic", "base", "finger")), "its joint 'hinge' can move"),
         (sdf(more=link("beside")), "its links base, beside hang together by no joint"),
         (sdf(more=joint("fixed", "world", "base")), "it is fixed to the world"),
@@ -152,3 +153,24 @@ def test_frames_need_no_mounting_on_the_base(own):
         sdf(shapes=hung, frames=TIP + frame("camera", (0, 0, 0, 0, 0, 0)), more=joint("fixed", "base", "lens"))
     )
     np.testing.assert_allclose(arm.X_EC[:3, 3], [0, 0, -0.2], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "where"),
+    [
+        (
+            sdf(
+                shapes=box((0.012, 0.026, 200.0), (0, 0, 100.0)),
+                frames=frame("tip", (0, 0, 200, 0, 0, 0)) + frame("camera", (0.1, 0, 199.0, 0, 0, 0)),
+            ),
+            "The tip is 200.00 m from the flange, the camera 1.00 m from the tip, looking 0 degrees off",
+        ),
+        (
+            sdf(frames=TIP + frame("camera", (0.1, 0, -0.05, np.pi, 0, 0))),
+            "The tip is 0.20 m from the flange, the camera 0.27 m from the tip, looking 180 degrees off",
+        ),
+    ],
+)
+def test_where_no_posture_looks_down_it_is_said_where_tip_and_camera_are(own, text, where):
+    with pytest.raises(ValueError, match=f"no posture looks at .*{where}"):
+        observation_posture(own(text), [0.5, 0.0], 0.5)

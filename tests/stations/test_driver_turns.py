@@ -1,6 +1,8 @@
 """The turns of the arm's driver with a robot that plays a script: no libfranka, a millisecond at a time."""
 
+import gc
 import itertools
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -233,3 +235,18 @@ def test_a_refused_command_is_told_with_mode_0_and_its_reason_on_the_channel_of_
         "holds: a command was refused",
         "it is 0.30 rad from where the arm is",
     ]
+
+
+def test_a_driver_that_has_ended_is_not_kept_by_the_network_it_listened_to():
+    """What C++ keeps alive Python cannot clear away at its end: Ruckig then tells of leaks in thirty lines."""
+    network, robot = DrakeLcm("memq://"), DrivenRobot("position")
+    drive = ArmDrive(False, FR3_LIMITS)
+    process = DriveProcess(robot, network, LcmConfig(), drive, print)
+    kept = [weakref.ref(process), weakref.ref(drive)]
+    gc.disable()
+    try:
+        del process, drive
+        assert [reference() for reference in kept] == [None, None]
+    finally:
+        gc.enable()
+    network.HandleSubscriptions(0)

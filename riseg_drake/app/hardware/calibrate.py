@@ -1,5 +1,6 @@
 """`riseg calibrate`: where the camera is, from a folder with views of a board, as the scenario's lines."""
 
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 from pydrake.math import RigidTransform, RollPitchYaw
 from rich.console import Console
 
@@ -31,8 +33,10 @@ SURE = (0.001, 0.0017)
 """Standard errors, m and rad (0.1 degrees), above which more views are advised."""
 GOOD = 1.0
 """Pixels; corners further off mean that something is not as it is said to be."""
-_PRINTED = 300 / 0.0254
-"""Pixels a metre of a board that is drawn: 300 an inch."""
+_DPI = 300
+"""Pixels an inch of a board that is drawn."""
+_PRINTED = _DPI / 0.0254
+"""The same a metre."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +47,8 @@ class CalibrateRequest:
     scenario: Path | None = None
     board: Sequence[str] = ("charuco", "7x5", "40", "30")
     """Kind, columns and rows, and two lengths, mm."""
-    mount: str = "wrist"
+    mount: str | None = None
+    """None: as the scenario says."""
     live: bool = False
     output: Path | None = None
     draw: Path | None = None
@@ -53,15 +58,22 @@ def calibrate_command(request: CalibrateRequest, console: Console) -> None:
     """Calibrate, and tell it. Raises CalibrationError, RecordingError and what a scenario raises."""
     board = board_of(request.board)
     if request.draw is not None:
-        write_told(request.draw, cv2.imencode(".png", board.drawn(_PRINTED))[1].tobytes())
+        png = io.BytesIO()
+        Image.fromarray(board.drawn(_PRINTED)).save(png, "png", dpi=(_DPI, _DPI))
+        write_told(request.draw, png.getvalue())
         width, height = (1000 * side for side in board.size)
-        console.print(f"{request.draw}: print it at 300 dpi, {width:.1f} x {height:.1f} mm, and measure it")
+        console.print(
+            f"{request.draw}: print it at {_DPI} dpi, {width:.1f} x {height:.1f} mm, and measure it",
+            highlight=False,
+            soft_wrap=True,
+        )
         return
     if request.folder is None:
         raise CalibrationError(
             "name the folder with the views, or a new one and --live; --draw FILE draws a board"
         )
-    config, world = load_scenario(request.scenario, HARDWARE).hardware, request.mount == "world"
+    config = load_scenario(request.scenario, HARDWARE).hardware
+    world = (request.mount or config.camera.mount) == "world"
     kinematics = PandaKinematics(config.panda)
     if request.live:
         record_live(config, board, request.folder, console)

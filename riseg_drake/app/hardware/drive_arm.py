@@ -4,6 +4,7 @@ import signal
 import threading
 import time
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -45,23 +46,23 @@ def drive_arm_command(request: DriveRequest, console: Console) -> None:
     config = load_scenario(request.scenario, HARDWARE).hardware
     robot, mode = config.panda.robot, request.mode or config.command.mode
     network = open_lcm(config.lcm)
-    console.print(f"drive-arm: connecting to {request.ip}; where nobody answers, that takes a minute")
+    tell = partial(console.print, highlight=False, soft_wrap=True)
+    tell(f"drive-arm: connecting to {request.ip}; where nobody answers, that takes a minute")
     link = FrankaLink(robot, request.ip)
     if request.check:
         checks = Checks(link, config.panda, X_WC=config.camera.fixed_pose)
         for line in checks.lines():
-            console.print(line)
+            tell(line)
         if checks.problems:
             raise LinkError("; ".join(checks.problems))
         return
     try:
         link.configure()
     except RobotStopped as stopped:
-        console.print(f"forces of its reflexes were not set: {stopped}")
+        tell(f"forces of its reflexes were not set: {stopped}")
     drive = ArmDrive(mode == VELOCITY, config.panda.limits)
-    tell = lambda line: console.print(f"drive-arm: {line}")  # noqa: E731
-    process = DriveProcess(link, network, config.lcm, drive, tell)
-    console.print(
+    process = DriveProcess(link, network, config.lcm, drive, lambda line: tell(f"drive-arm: {line}"))
+    tell(
         f"drive-arm: {robot} at {request.ip}, commands of {mode} from {config.lcm.command_channel}; "
         "Ctrl-C brings the arm to rest and ends"
     )
@@ -69,7 +70,7 @@ def drive_arm_command(request: DriveRequest, console: Console) -> None:
         be_prompt(PRIORITY)
         process.run()
     if process.cycles.count:
-        console.print(f"drive-arm: work of a cycle {process.cycles.told()}")
+        tell(f"drive-arm: work of a cycle {process.cycles.told()}")
 
 
 class _ended_by_signals:  # noqa: N801 - is read as a context manager

@@ -5,10 +5,12 @@ import json
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 from pydrake.math import RigidTransform, RollPitchYaw
 from rich.console import Console
 
 from riseg_drake.app.cli import main
+from riseg_drake.app.hardware import calibrate
 from riseg_drake.app.hardware.board_views import record_views
 from riseg_drake.app.hardware.calibrate import board_of, scenario_lines
 from riseg_drake.app.scenario import HARDWARE, Scenario, load_scenario
@@ -18,6 +20,7 @@ from riseg_drake.geometry.se3 import exp_se3, inverse, log_se3, translation
 from riseg_drake.recording import layout
 from riseg_drake.recording.layout import RecordingError, pose_to_numbers
 from riseg_drake.robot.calibration_board import CalibrationBoard
+from riseg_drake.robot.camera_calibration import CalibrationError
 from riseg_drake.robot.kinematics import PandaKinematics
 from tests.robot.drawn_board import drawn_board
 
@@ -104,7 +107,30 @@ def test_a_board_is_named_in_millimetres_and_drawn_at_its_size(tmp_path, capsys)
         == 0
     )
     assert "177.8 x 127.0 mm" in " ".join(capsys.readouterr().out.split())
-    assert cv2.imread(str(tmp_path / "board.png"), cv2.IMREAD_GRAYSCALE).shape == (1500, 2100)
+    with Image.open(tmp_path / "board.png") as drawn:
+        assert drawn.size == (2100, 1500)
+        assert drawn.info["dpi"] == pytest.approx((300, 300), abs=0.02)  # PNG has whole pixels a metre
+
+
+@pytest.mark.parametrize(
+    ("mount", "words", "world"),
+    [("wrist", [], False), ("world", [], True), ("world", ["--mount", "wrist"], False)],
+)
+def test_where_the_camera_is_mounted_is_the_scenario_s_unless_it_is_said(
+    tmp_path, monkeypatch, kinematics, X_EC, mount, words, world
+):
+    scenario, asked = tmp_path / "mine.yaml", []
+    X_WC = ", X_WC: [1.0, 0.0, 0.5, -2.3, 0.0, 1.5]" if mount == "world" else ""
+    scenario.write_text(f"station: !HardwareStationConfig\n  camera: {{mount: {mount}{X_WC}}}\n")
+    folder = write_views(tmp_path / "views", kinematics, X_EC, count=1)
+
+    def solver(views, k, world):
+        asked.append(world)
+        raise CalibrationError("not needed here")
+
+    monkeypatch.setattr(calibrate, "calibrated", solver)
+    assert main(["calibrate", str(folder), "--scenario", str(scenario), *words]) == 2
+    assert asked == [world]
 
 
 @pytest.mark.parametrize(
