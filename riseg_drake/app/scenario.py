@@ -66,7 +66,10 @@ class Scenario:
         """The station, for what only a simulation can do. Raises ScenarioError for a real one."""
         if isinstance(self.station, SimulatedStationConfig):
             return self.station
-        raise ScenarioError("the scenario describes a real robot; this command wants a simulated station")
+        raise ScenarioError(
+            "the scenario describes a real robot; this command wants a simulated station "
+            "(for the emulator one with the same tool and camera, see docs/emulator.md)"
+        )
 
     @property
     def hardware(self) -> HardwareStationConfig:
@@ -74,8 +77,8 @@ class Scenario:
         if isinstance(self.station, HardwareStationConfig):
             return self.station
         raise ScenarioError(
-            "the scenario describes a simulation; `riseg hardware` wants `station: !HardwareStationConfig`, "
-            "as the built-in hardware.yaml has it"
+            "the scenario describes a simulation; what drives a real robot wants `station: "
+            "!HardwareStationConfig`, as the built-in hardware.yaml has it"
         )
 
 

@@ -45,7 +45,7 @@ class SegmentationBlock:
     inputs: dict[str, InputPort]
     """Those of FrameView: the keys of STATION_PORTS where all follows from the joint angles."""
     outputs: dict[str, OutputPort]
-    """`pair`, `above_table`, `expected_flow`, `optical_flow`, `groups`, `mask`, `settled_mask`,
+    """`pair`, `passed_over`, `above_table`, `expected_flow`, `optical_flow`, `groups`, `mask`, `settled_mask`,
     `decided`, `untouched`, `segmentation`."""
 
 
@@ -126,6 +126,7 @@ def add_stages(
         inputs={port.get_name(): port for port in map(view.get_input_port, range(view.num_input_ports()))},
         outputs={
             "pair": memory.GetOutputPort("whole_pair"),
+            "passed_over": memory.GetOutputPort("passed_over"),
             **{name: system.GetOutputPort(name) for name, system in outputs.items()},
         },
     )

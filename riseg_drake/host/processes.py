@@ -76,6 +76,24 @@ def stopped_by_signals(*loaders: str) -> Iterator[Stop]:
             signal.signal(number, handler)
 
 
+@contextmanager
+def ended_at_once() -> Iterator[None]:
+    """Stop signals end the process, for the time of a `with` around what waits in C++ and would hear none.
+
+    Nothing may have begun that would have to be ended well.
+    """
+    numbers = STOP_SIGNALS if threading.current_thread() is threading.main_thread() else ()
+    before = {number: signal.getsignal(number) for number in numbers}
+    for number, handler in before.items():
+        if handler is not signal.SIG_IGN:
+            signal.signal(number, signal.SIG_DFL)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 def heed_no_more() -> None:
     """All is done but for Python's own end: a stop signal has nothing to stop, and changes no exit code."""
     for number in STOP_SIGNALS:

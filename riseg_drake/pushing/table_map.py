@@ -22,12 +22,20 @@ from riseg_drake.geometry.rgbd import Frame
 class TableMapParameters:
     """Where the map lies and how fine it is."""
 
-    work_area_W: list[float] = field(default_factory=lambda: [0.25, 0.75, -0.28, 0.28])
+    work_area_W: list[float] = field(
+        default_factory=lambda: [0.25, 0.75, -0.28, 0.28], metadata={"sizes": (4,), "least": -1.5, "most": 1.5}
+    )
     """[x_min, x_max, y_min, y_max], m: the part of the table that objects must not leave."""
     surround: float = 0.08
     """What the map shows around the work area, m: the pusher may start outside of it."""
     cell: float = 0.002
     """Edge of a cell, m; enlarged where the pixels are coarser than that."""
+
+    def check(self) -> None:
+        """Raise ValueError for an area that is none."""
+        x_min, x_max, y_min, y_max = self.work_area_W
+        if not (x_min < x_max and y_min < y_max):
+            raise ValueError(f"work_area_W is {self.work_area_W}; expected [x_min, x_max, y_min, y_max], m")
 
 
 @runtime_checkable

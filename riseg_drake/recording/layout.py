@@ -114,7 +114,9 @@ def camera_from_json(content: Any) -> tuple[Intrinsics, float]:
     if not isinstance(content, dict):
         raise RecordingError(f"it must hold one object with the keys {CAMERA_KEYS}")
     for key in keys:
-        value = content.get(key)
+        if key not in content:
+            raise RecordingError(f'"{key}" is missing; the keys are {CAMERA_KEYS}')
+        value = content[key]
         if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e9:
             raise RecordingError(f'"{key}" must be a number; the keys are {CAMERA_KEYS}')
     for key in ("width", "height"):

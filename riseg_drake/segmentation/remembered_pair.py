@@ -1,5 +1,6 @@
 """The one memory of frames: (I_t-1, I_t, theta_t-1, theta_t) and what stands on the table in both."""
 
+import math
 from dataclasses import dataclass, field, replace
 
 from riseg_drake.geometry.rgbd import NO_PAIR, Frame, FramePair, Immutable
@@ -7,6 +8,15 @@ from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE, AboveTable
 from riseg_drake.segmentation.camera_motion import CameraMotionParameters, PoseError, renewed_pose_error
 from riseg_drake.segmentation.exposure import with_equal_exposure
 from riseg_drake.segmentation.frame_pairs import FramePairParameters, next_pair
+
+
+@dataclass(frozen=True)
+class PassedOver:
+    """A frame that was left out, as it shows no table: the hand before the lens, a tip too near for depth."""
+
+    time: float = -math.inf
+    """Of the frame, s; -inf: none was left out since the last that was taken."""
+    why: str = ""
 
 
 @dataclass(frozen=True)
@@ -18,6 +28,8 @@ class RememberedPair(Immutable):
     above_1: AboveTable = NOTHING_ABOVE_TABLE
     pose_error: PoseError = field(default_factory=PoseError)
     """Of the camera's motion, as the table shows it."""
+    passed_over: PassedOver = PassedOver()
+    """The last frame, if it was."""
 
 
 def with_frame(

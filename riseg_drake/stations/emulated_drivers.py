@@ -96,7 +96,7 @@ class PandaSide:
         self._told: DriverEnd | None = None
         self._skipped_us = 0
         """Since that was told, and when and at which number of status messages it was."""
-        self._told_at = arm.wall_us, 0
+        self._told_at: tuple[int, int] | None = None  # before the first tick: its start is no measure
         lcm.Subscribe(config.lcm.command_channel, self._hear)
 
     def _hear(self, raw: bytes) -> None:  # LCM calls this from C: nothing may be raised
@@ -187,6 +187,8 @@ class PandaSide:
 
     def _tell_skipped(self, wall_us: int) -> None:
         """Note that this computer is too slow, and which rate is reached."""
+        if self._told_at is None:
+            self._skipped_us, self._told_at = 0, (wall_us, self.published)
         since, published = self._told_at
         elapsed = wall_us - since
         if elapsed < _QUIET:

@@ -40,6 +40,8 @@ from riseg_drake.stations.wrist_camera import check_camera
 
 LONGEST_EXPOSURE = 1.0
 """A picture is sent at most this long after it was taken, s."""
+_SQUARE, _MIDDLE = 0.1, 0.1
+"""Shares by which fx and fy differ at most, and in which the principal point is off the middle."""
 TARGET_PERIOD = 0.01
 """Time between two targets for the arm, s; the process that sends commands puts a cubic between them."""
 
@@ -77,6 +79,12 @@ class HardwareCameraConfig(CameraMount):
         """Raise ValueError for a camera that cannot be."""
         self.check_mount()
         check_camera(self.cx, self.cy, self.full_width, self.full_height, self.depth_min, self.depth_max)
+        if abs(self.fx / self.fy - 1) > _SQUARE:
+            raise ValueError(f"fx is {self.fx:g} and fy {self.fy:g}; a RealSense camera's pixels are square")
+        for name, centre, side in (("cx", self.cx, "full_width"), ("cy", self.cy, "full_height")):
+            size = getattr(self, side)
+            if abs(centre / size - 0.5) > _MIDDLE:
+                raise ValueError(f"{name} is {centre:g}; expected about half of {side}, {size / 2:g} px")
         if self.width > self.full_width:
             raise ValueError(f"width is {self.width}; at most full_width, {self.full_width} px")
 
@@ -119,6 +127,11 @@ class HardwareStationConfig:
         except ValueError as error:
             raise ValueError(f"command.{error}") from None
         check_start_position(self.start_position, limits, self.command.limits.position_margin)
+        lower, upper = self.command.safety.workspace_lower, self.command.safety.workspace_upper
+        if not all(low <= c <= high for low, c, high in zip(lower, self.centre_W, upper, strict=False)):
+            raise ValueError(
+                f"centre_W is {self.centre_W}; expected in the workspace, from {lower[:2]} to {upper[:2]} m"
+            )
 
 
 class TargetSink(Protocol):

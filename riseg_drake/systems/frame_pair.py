@@ -1,6 +1,7 @@
 """The one memory of frames: (I_t-1, I_t, theta_t-1, theta_t) and what stands on the table in both."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
@@ -9,7 +10,8 @@ from riseg_drake.geometry.rgbd import NO_FRAME, NO_PAIR
 from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE
 from riseg_drake.segmentation.camera_motion import CameraMotionParameters
 from riseg_drake.segmentation.frame_pairs import FramePairParameters
-from riseg_drake.segmentation.remembered_pair import RememberedPair, with_frame
+from riseg_drake.segmentation.remembered_pair import PassedOver, RememberedPair, with_frame
+from riseg_drake.segmentation.table_plane import NoPlaneError
 from riseg_drake.systems.value_input import ValueInput
 
 
@@ -32,6 +34,7 @@ class FramePairMemory(LeafSystem):
         above_table_reference: AboveTable at t-1.
         above_table: AboveTable at t.
         pose_error: PoseError, what the table showed of it so far.
+        passed_over: PassedOver, the last frame if it shows no table, and was left out.
         pair_time: time of the frame at t [1], s; 0 before the first.
     """
 
@@ -59,6 +62,7 @@ class FramePairMemory(LeafSystem):
             ("above_table_reference", lambda memory: memory.above_0),
             ("above_table", lambda memory: memory.above_1),
             ("pose_error", lambda memory: memory.pose_error),
+            ("passed_over", lambda memory: memory.passed_over),
         ):
             self._declare_output(name, read)
         self.DeclareVectorOutputPort(
@@ -67,14 +71,17 @@ class FramePairMemory(LeafSystem):
 
     def _take_frame(self, context: Context, state: State) -> EventStatus:
         memory, frame = self._recall(context), self._frame.Eval(context)
-        if frame.time <= memory.pair.current.time:
+        if frame.time <= max(memory.pair.current.time, memory.passed_over.time):
             # Said so, lest all that follows from the state be computed anew: flow, for one.
             return EventStatus.DidNothing()
         # Nothing has flowed before there is a pair: the way to the span leads through both frames.
         flow_span = 0.0 if memory.pair is NO_PAIR else float(self._flow_span.Eval(context)[0])
-        following = with_frame(
-            memory, frame, self._above.Eval(context), flow_span, self._parameters, self._camera_motion
-        )
+        try:
+            above = self._above.Eval(context)
+        except NoPlaneError as error:
+            following = replace(memory, passed_over=PassedOver(frame.time, str(error)))
+        else:
+            following = with_frame(memory, frame, above, flow_span, self._parameters, self._camera_motion)
         state.get_mutable_abstract_state(self._memory).set_value(following)
         return EventStatus.Succeeded()
 

@@ -133,6 +133,28 @@ def test_ctrl_c_waits_until_what_must_not_be_disturbed_is_done():
     assert stop.exit_code == 130
 
 
+ENDED_AT_ONCE = """
+import os, signal, sys
+from riseg_drake.host.processes import ended_at_once, stopped_by_signals
+with stopped_by_signals("") as stop:
+    try:
+        with ended_at_once():
+            if sys.argv[1] == "within":
+                os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), signal.SIGINT)
+    except KeyboardInterrupt:
+        print("heard")
+"""
+
+
+@pytest.mark.parametrize(("when", "code", "out"), [("within", -signal.SIGINT, ""), ("after", 0, "heard\n")])
+def test_around_what_hears_no_signal_the_process_ends_at_once_and_after_it_as_ever(when, code, out):
+    done = subprocess.run(
+        [sys.executable, "-c", ENDED_AT_ONCE, when], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (code, out, "")
+
+
 def test_what_is_ignored_stays_ignored():
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
     try:

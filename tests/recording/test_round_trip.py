@@ -98,7 +98,7 @@ def test_depth_is_found_by_the_nearest_stamp_within_the_limit(tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("camera.json", '{"width": 64}', 'camera.json: "height" must be a number'),
+        ("camera.json", '{"width": 64}', 'camera.json: "height" is missing; the keys are'),
         ("camera.json", "{\n oops", "camera.json: line 2 is not JSON"),
         ("rgb.txt", "0.0\n", "rgb.txt: line 1 must be: timestamp file"),
         ("depth.txt", "zero depth/000000.png\n", "depth.txt: line 1 holds 'zero'"),

@@ -1,5 +1,6 @@
 """FramePairMemory: which image goes with which theta, and with which reference."""
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,8 @@ from riseg_drake.geometry.rgbd import NO_FRAME, NO_PAIR, FramePair
 from riseg_drake.segmentation.above_table import NOTHING_ABOVE_TABLE, AboveTable
 from riseg_drake.segmentation.camera_motion import CameraMotionParameters
 from riseg_drake.segmentation.frame_pairs import FramePairParameters
+from riseg_drake.segmentation.remembered_pair import PassedOver
+from riseg_drake.segmentation.table_plane import NoPlaneError
 from riseg_drake.systems import frame_pair
 from riseg_drake.systems.frame_pair import FramePairMemory
 from riseg_drake.systems.frame_view import FrameView
@@ -72,15 +75,22 @@ class Station(LeafSystem):
 class AboveOfFrame(LeafSystem):
     """In place of ObjectsAboveTable: says of which frame it would have been, by the image's number."""
 
-    def __init__(self) -> None:
+    def __init__(self, bare: Collection[int] = ()) -> None:
+        """The images of the numbers in `bare` show no table."""
         super().__init__()
+        self._bare = bare
         frame = self.DeclareAbstractInputPort("frame", AbstractValue.Make(NO_FRAME))
         self.DeclareAbstractOutputPort(
             "above_table",
             AbstractValue.Make(NOTHING_ABOVE_TABLE).Clone,
-            lambda context, output: output.set_value(above_of(number_in(frame.Eval(context)))),
+            lambda context, output: output.set_value(self._above(number_in(frame.Eval(context)))),
             {self.all_input_ports_ticket()},
         )
+
+    def _above(self, number: int | None) -> AboveTable:
+        if number in self._bare:
+            raise NoPlaneError(f"no plane in {number}")
+        return above_of(number)
 
 
 def forward(q: np.ndarray) -> np.ndarray:
@@ -108,11 +118,11 @@ def above_of(number: int | None) -> AboveTable:
 class Loop:
     """Station, FrameView and FramePairMemory, simulated."""
 
-    def __init__(self, found: float = 0.0, repeat: int = 1, **parameters) -> None:
+    def __init__(self, found: float = 0.0, repeat: int = 1, bare: Collection[int] = (), **parameters) -> None:
         builder = DiagramBuilder()
         self.station = builder.AddSystem(Station(repeat))
         view = builder.AddSystem(FrameView(CAMERA, forward, silhouette))
-        above = builder.AddSystem(AboveOfFrame())
+        above = builder.AddSystem(AboveOfFrame(bare))
         self.memory = builder.AddSystem(FramePairMemory(PERIOD, OFFSET, FramePairParameters(**parameters)))
         span = builder.AddSystem(ConstantVectorSource([found]))
         for name in ("color_image", "depth_image", "image_time", "position"):
@@ -146,6 +156,7 @@ def test_ports_have_the_names_of_the_contract() -> None:
         "above_table_reference",
         "above_table",
         "pose_error",
+        "passed_over",
         "pair_time",
     ]
 
@@ -210,6 +221,19 @@ def test_an_image_that_repeats_is_no_new_frame() -> None:
     assert [pair.current.sequence for pair in pairs] == [0, 0, 0, 1, 1, 1, 2, 2, 2]
     assert pairs[3] is pairs[5]
     assert [number_in(pair.reference) for pair in pairs] == [0, 0, 0, 0, 0, 0, 1, 1, 1]
+
+
+def test_an_image_that_shows_no_table_is_passed_over_and_told_until_one_does() -> None:
+    loop = Loop(bare={0, 2, 3}, kind="consecutive")
+    numbers, told = [], []
+    for tick in range(6):
+        pair = loop.at(tick * PERIOD + JUST_AFTER)
+        numbers.append(None if pair is NO_PAIR else (number_in(pair.reference), number_in(pair.current)))
+        told.append(loop.read("passed_over"))
+    assert numbers == [None, (1, 1), (1, 1), (1, 1), (1, 4), (4, 5)]
+    nothing = PassedOver()
+    out = [PassedOver(pytest.approx(number * PERIOD), f"no plane in {number}") for number in (0, 2, 3)]
+    assert told == [out[0], nothing, out[1], out[2], nothing, nothing]
 
 
 def test_an_unknown_kind_of_pairs_is_refused_with_the_choices() -> None:

@@ -13,6 +13,7 @@ from rich.console import Console
 
 from riseg_drake.app.hardware.command import HARDWARE
 from riseg_drake.app.scenario import load_scenario
+from riseg_drake.host.processes import ended_at_once
 from riseg_drake.robot.command_stream import VELOCITY
 from riseg_drake.robot.description import PandaDescription
 from riseg_drake.robot.kinematics import PandaKinematics
@@ -47,8 +48,12 @@ def drive_arm_command(request: DriveRequest, console: Console) -> None:
     robot, mode = config.panda.robot, request.mode or config.command.mode
     network = open_lcm(config.lcm)
     tell = partial(console.print, highlight=False, soft_wrap=True)
-    tell(f"drive-arm: connecting to {request.ip}; where nobody answers, that takes a minute")
-    link = FrankaLink(robot, request.ip)
+    tell(
+        f"drive-arm: connecting to {request.ip}; where nobody answers, that takes a minute, and where another "
+        "program drives the robot, as long as it does"
+    )
+    with ended_at_once():
+        link = FrankaLink(robot, request.ip)
     if request.check:
         checks = Checks(link, config.panda, X_WC=config.camera.fixed_pose)
         for line in checks.lines():
@@ -114,7 +119,8 @@ class Checks:
         rate = count / (time.monotonic() - started)
         if rate < SLOWEST_RATE:
             self.problems.append(
-                f"{rate:.0f} states a second came; expected 1000: wire the control box directly"
+                f"{rate:.0f} states a second came; expected 1000: wire the control box directly, and let this "
+                "computer do nothing else"
             )
         modes = ("other", "idle", "move", "guiding", "reflex", "user stopped", "recovering")
         errors = f", errors: {', '.join(last.errors)}" if last.errors else ""

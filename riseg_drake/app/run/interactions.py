@@ -1,5 +1,6 @@
 """Alg. 1: the robot acts and segments, and every interaction leaves L*_t behind."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -12,6 +13,7 @@ from pydrake.systems.framework import Context, EventStatus
 
 from riseg_drake.app.diagram import WiredDiagram
 from riseg_drake.app.output import Step
+from riseg_drake.app.work_state import RunStoppedError
 from riseg_drake.evaluation.disturbance import Disturbance, motion_between, object_at
 from riseg_drake.evaluation.in_motion import FramesInMotion, moved_objects
 from riseg_drake.evaluation.scores import score
@@ -19,11 +21,15 @@ from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pushing.arm_path import ArmPhase
 from riseg_drake.pushing.decision import UNDECIDED, Decision, Ending
 from riseg_drake.pushing.push import NO_PUSH, Push
+from riseg_drake.segmentation.remembered_pair import PassedOver
 from riseg_drake.segmentation.segmentation import Segmentation
 from riseg_drake.segmentation.untouched import untouched_clusters
 from riseg_drake.stations.object_models import SceneError
 from riseg_drake.stations.physics import advance
 from riseg_drake.systems.stage_clock import StageClock
+
+BLIND = 30.0
+"""A run ends when no picture has shown the table for this long, s: longer than any push takes."""
 
 Listener = Callable[[Frame, Context], None]
 """Is told every camera frame once, with the diagram's context at that moment."""
@@ -97,8 +103,8 @@ def interactions(
     It ends when the arm is done (a_i = null, or enough pushes were made), or when `longest` seconds have
     passed; `progress.end` and `progress.decision` say which. At wall time also when somebody else has set
     `progress.end`; how things stand then is yielded, too. The truth is that of the simulation if not given.
-    Raises PhysicsError where a simulation cannot go on, and SceneError where its camera sees none of its
-    objects at the first look.
+    Raises PhysicsError where a simulation cannot go on, SceneError where its camera sees none of its
+    objects at the first look, and RunStoppedError where the table is not seen any more.
     """
     clock.watch(wired.stages)
     simulator = Simulator(wired.diagram)
@@ -114,6 +120,9 @@ def interactions(
     simulator.Initialize()
     while not progress.end:  # line 4
         go_on(start + longest)  # lines 5 to 8, up to the next mask or the arm's next phase
+        if news.blind:
+            progress.end = f"for {BLIND:g} s no picture has shown a table; the last: {news.blind}"
+            raise RunStoppedError(progress.end)
         if news.mask_is_new:
             news.mask_is_new = False
             progress.frames += 1
@@ -181,6 +190,8 @@ class _News:
 
     frame: Frame
     """I_t of the newest mask; not there before the first."""
+    blind = ""
+    """Why no frame has been taken for long; empty while that is not so."""
 
     def __init__(self, wired: WiredDiagram, look: Callable[[Context], bool] | None):
         self._look = look
@@ -188,11 +199,20 @@ class _News:
         self.mask_is_new = False
         self._wired = wired
         self._sequence = -1
+        self._blind_since = math.inf
 
     def look(self, context: Context) -> EventStatus:
         """The simulator's monitor; it is called after every step, hundreds of times a second."""
         wanted = self._look is not None and self._look(context)
         phase = self._wired.phase(context)
+        passed_over: PassedOver = self._wired.read("passed_over", context)
+        if passed_over.why:
+            self._blind_since = min(self._blind_since, passed_over.time)
+            if passed_over.time - self._blind_since > BLIND:
+                self.blind = passed_over.why
+                return EventStatus.ReachedTermination(self._wired.diagram, "the table is not seen")
+        else:
+            self._blind_since = math.inf
         sequence = self._wired.segmentation(context).sequence
         if phase is self.phase and sequence == self._sequence:
             if wanted:

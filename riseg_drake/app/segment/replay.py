@@ -14,6 +14,7 @@ from riseg_drake.app.scenario import Scenario
 from riseg_drake.app.segmentation_block import make_segmentation
 from riseg_drake.recording.layout import RecordedFrame
 from riseg_drake.segmentation.segmentation import Segmentation
+from riseg_drake.segmentation.table_plane import NoPlaneError
 from riseg_drake.systems.frame_view import FrameView
 
 PERIOD = 1 / 15
@@ -52,6 +53,9 @@ class Replay:
             context.SetTime(half_way)
             self._simulator.Initialize()
             raise
+        passed_over = self.read("passed_over")
+        if passed_over.time == frame.time:
+            raise NoPlaneError(passed_over.why)
         return self._diagram.GetOutputPort("mask").Eval(context)
 
     def read(self, port: str) -> Any:

@@ -5,14 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource
+from pydrake.systems.primitives import ConstantVectorSource, ZeroOrderHold
 
-from riseg_drake.app.run.interactions import Progress, Truth, _Book, interactions
+from riseg_drake.app.run.interactions import BLIND, Progress, Truth, _Book, interactions
+from riseg_drake.app.work_state import RunStoppedError
 from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.pushing.arm_path import ArmPhase
 from riseg_drake.pushing.decision import UNDECIDED
 from riseg_drake.pushing.push import NO_PUSH
+from riseg_drake.segmentation.remembered_pair import PassedOver
 from riseg_drake.segmentation.segmentation import nothing_segmented
 from riseg_drake.stations.object_models import SceneError
 from riseg_drake.systems.stage_clock import StageClock
@@ -35,8 +37,8 @@ class Scene:
     def segmentation(self, _):
         return replace(nothing_segmented(SIZE), label=self.mask(None))
 
-    def read(self, _, __):
-        return NO_PUSH
+    def read(self, port, _):
+        return PassedOver() if port == "passed_over" else NO_PUSH
 
     def truth(self, frame, _):
         def draw():
@@ -122,6 +124,38 @@ def test_a_run_that_is_over_shows_its_end_once():
     assert list(interactions(idle, StageClock(), progress, 0.5, truth=lambda *_: None)) == []
     assert progress.end.startswith("0.5 s were simulated")
     assert idle.ends == [0.5]
+
+
+class Blind(Idle):
+    """From 1 s on no picture shows the table, twice a second; at `seen` one does."""
+
+    def __init__(self, seen):
+        super().__init__()
+        builder = DiagramBuilder()
+        nothing, hold = builder.AddSystem(ConstantVectorSource([0.0])), builder.AddSystem(ZeroOrderHold(0.5, 1))
+        builder.Connect(nothing.get_output_port(), hold.get_input_port())
+            builder.AddSystem(ConstantVectorSource([0.0])), builder.AddSystem(ZeroOrderHold(0.5, 1))
+        )
+        self.diagram, self.seen = builder.Build(), seen
+
+    def read(self, port, context):
+        time = context.get_time()
+        if port != "passed_over" or time < 1.0 or time == self.seen:
+            return super().read(port, context)
+        return PassedOver(time, "no plane: 0 pixels with depth")
+
+
+@pytest.mark.parametrize(("seen", "end"), [(-1.0, 1.0 + BLIND + 0.5), (20.0, 20.5 + BLIND + 0.5)])
+def test_a_run_ends_when_for_half_a_minute_no_picture_has_shown_the_table(seen, end):
+    blind, progress = Blind(seen), Progress()
+    with pytest.raises(
+        RunStoppedError, match="for 30 s no picture has shown a table; the last: no plane: 0 pix"
+    ):
+        list(interactions(blind, StageClock(), progress, 100.0, truth=lambda *_: None))
+    blind, progress = Blind(seen), Progress()
+    before = end - 0.25
+    assert list(interactions(blind, StageClock(), progress, before, truth=lambda *_: None)) == []
+    assert progress.end.startswith(f"{before:g} s were simulated")
 
 
 def first_look(labels, names):
