@@ -134,8 +134,6 @@ class Blind(Idle):
         builder = DiagramBuilder()
         nothing, hold = builder.AddSystem(ConstantVectorSource([0.0])), builder.AddSystem(ZeroOrderHold(0.5, 1))
         builder.Connect(nothing.get_output_port(), hold.get_input_port())
-            builder.AddSystem(ConstantVectorSource([0.0])), builder.AddSystem(ZeroOrderHold(0.5, 1))
-        )
         self.diagram, self.seen = builder.Build(), seen
 
     def read(self, port, context):
