@@ -151,7 +151,7 @@ def test_a_run_ends_when_for_half_a_minute_no_picture_has_shown_the_table(seen, 
     ):
         list(interactions(blind, StageClock(), progress, 100.0, truth=lambda *_: None))
     blind, progress = Blind(seen), Progress()
-    before = end - 0.25
+    before = end - 0.5
     assert list(interactions(blind, StageClock(), progress, before, truth=lambda *_: None)) == []
     assert progress.end.startswith(f"{before:g} s were simulated")
 
