@@ -1,5 +1,6 @@
 """The models that a scene may be drawn from: one rigid body each, found in a folder and measured."""
 
+import difflib
 import os
 import warnings
 from collections.abc import Sequence
@@ -92,7 +93,9 @@ def find_models(folders: str | Sequence[str], names: Sequence[str] = ()) -> list
         raise SceneError("objects: no folder; expected one or more with *.sdf or *.urdf models")
     unknown = sorted(set(names) - set(paths))
     if unknown:
-        raise SceneError(f"names: no model {', '.join(unknown)}; there are {', '.join(sorted(paths))}")
+        near = difflib.get_close_matches(unknown[0], paths, n=1)
+        hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(sorted(paths))}"
+        raise SceneError(f"names: no model {', '.join(unknown)}; {hint}")
     models = [measure(name, paths[name]) for name in sorted(names or paths)]
     _tell_without_inertia(models)
     return models
@@ -123,7 +126,12 @@ def parse_body(plant: MultibodyPlant, path: Path) -> RigidBody:
             find_packages(parser, path)
             instances = parser.AddModels(path)
     except (ModelFileError, RuntimeError, ValueError, SystemExit) as error:  # SystemExit: Drake's assertions
-        raise SceneError(f"{path} cannot be read: {one_line(error)}") from error
+        words = one_line(error)
+        if "inertia" in words:
+            words = (
+                f"{words}; moments are kg m^2 about the centre of mass, each less than the other two together"
+            )
+        raise SceneError(f"{path} cannot be read: {words}") from error
     bodies = [plant.get_body(index) for instance in instances for index in plant.GetBodyIndices(instance)]
     if len(bodies) != 1:
         raise SceneError(f"{path} has {len(bodies)} bodies; an object of a scene is a single rigid body")
