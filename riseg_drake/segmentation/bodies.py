@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.geometry.camera import rays
 from riseg_drake.geometry.rgbd import Frame, FramePair, Immutable
-from riseg_drake.geometry.se3 import inverse, seen_from
+from riseg_drake.geometry.se3 import inverse, move_points, seen_from
 from riseg_drake.segmentation.above_table import AboveTable
 from riseg_drake.segmentation.belief import Belief, BeliefParameters
 from riseg_drake.segmentation.keyframe import Keyframe
@@ -19,7 +20,7 @@ from riseg_drake.segmentation.partition import (
     shared_area,
     with_ids,
 )
-from riseg_drake.segmentation.propagation import UNKNOWN, carry_labels, draw_labels
+from riseg_drake.segmentation.propagation import UNKNOWN, carry_labels, draw_labels, pixels_of
 from riseg_drake.segmentation.told_apart import identity_costs, moving_apart, with_lost
 
 _BLIND = 0.004
@@ -40,8 +41,8 @@ class Bodies(Immutable):
     told: NDArray[np.float64]
     """[I, I], nats that speak against two ids' being one body (`told_apart`)."""
     latest: NDArray[np.intp]
-    """[N], the id that each has had last since the keyframe, 0 = none: what seems to stand still for a moment,
-    as its motion was not found, gets it back."""
+    """[N], the id that each has had last for itself since the keyframe, 0 = none: what seems to stand still for
+    a moment, as its motion was not found, or to be one with something known, gets it back."""
 
     def seen_from(self, X_NK: NDArray[np.float64]) -> "Bodies":
         """The same with motions as a camera N sees them, in which the keyframe's has the pose X_NK [4, 4]."""
@@ -95,8 +96,47 @@ def bodies_of(
     free = parameters.partition.rigid_min
     told = with_lost(told, belief.body, body, next_id, seen.nats, keyframe.area, free)
     told = told if parameters.told else np.zeros_like(told)
-    latest = np.where(body > 0, body, before.latest)
+    # What is one with something known for a moment has its own id again when it is not.
+    own = (body > 0) & ((body == belief.body) | (body >= belief.next_id) | (before.latest == 0))
+    latest = np.where(own, body, before.latest)
     return seen, Bodies(body, motion[part], seen.motions_K, next_id, told, latest)
+
+
+def unseen_kept(bodies: Bodies, before: Bodies, keyframe: Keyframe, frame: Frame, least: float) -> Bodies:
+    """With what has moved `before` where it was then, if a frame does not show where that is.
+
+    What is out of the picture, or behind the robot, is explained by any motion that takes it there, too. A body
+    is shown where at least `least` m^2 of it are.
+    """
+    owner, at, shown = points_in_view(keyframe, before, frame)
+    shown[shown] = ~frame.robot[tuple(at[shown].T)]
+    share = np.bincount(before.body[owner[shown]], minlength=before.next_id) / max(1, len(owner))
+    seen = share * keyframe.area.sum() / keyframe.pixels_per_metre**2
+    unseen = (before.motion > 0) & (seen[before.body] < least)
+    if not unseen.any():
+        return bodies
+    motions, of_motion = np.unique(before.motion[unseen], return_inverse=True)
+    body, motion = bodies.body.copy(), bodies.motion.copy()
+    body[unseen], motion[unseen] = before.body[unseen], len(bodies.motions_K) + of_motion
+    motions_K = np.concatenate([bodies.motions_K, before.motions_K[motions]])
+    return replace(bodies, body=body, motion=motion, motions_K=motions_K)
+
+
+def points_in_view(
+    keyframe: Keyframe, bodies: Bodies, frame: Frame
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_]]:
+    """Where some two thousand points of a keyframe are by now: the superpixel [P] of each, its pixel (v, u)
+    [P, 2] in a frame, and whether that is in the picture [P]."""
+    every = slice(None, None, 1 + len(keyframe.owner) // 2000)
+    owner, (v, u) = keyframe.owner[every], keyframe.points.pixel[:, every]
+    p_KQ = rays(keyframe.frame.intrinsics)[v, u].astype(float) * keyframe.points.depth[every, None]
+    X_CK, motion = inverse(frame.X_WC) @ keyframe.frame.X_WC, bodies.motion[owner]
+    at, inside = np.zeros((len(owner), 2), np.intp), np.zeros(len(owner), bool)
+    for k in np.unique(motion):
+        which = motion == k
+        p_CQ = move_points(X_CK @ bodies.motions_K[k], p_KQ[which])
+        at[which], inside[which] = pixels_of(p_CQ, frame.intrinsics)
+    return owner, at, inside
 
 
 def split_off(part: NDArray[np.intp], body: NDArray[np.intp], area: NDArray[np.intp]) -> NDArray[np.bool_]:
@@ -138,6 +178,20 @@ def carry_bodies(
     blind = np.flatnonzero(blind & (drawn > 0))
     found.ravel()[blind] = id_of.take(drawn.ravel().take(blind))
     return found
+
+
+def confirmed(
+    label: NDArray[np.uint16], bodies: Bodies, before: Bodies, decided: int, least: float
+) -> NDArray[np.uint16]:
+    """The mask [H, W] of a frame in motion without what the next frame may not find.
+
+    Ids from `decided` on, that no rest has decided about yet, are UNKNOWN unless a frame `before` has found
+    them, too, and at least `least` pixels of them are seen.
+    """
+    fresh = np.unique(bodies.body[bodies.body >= decided])
+    few = [np.count_nonzero(label == a) < least for a in fresh]
+    out = fresh[~np.isin(fresh, before.latest) | np.array(few, bool)]
+    return np.where(np.isin(label, out), UNKNOWN, label) if len(out) else label
 
 
 def carry_superpixels(

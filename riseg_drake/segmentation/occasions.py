@@ -6,7 +6,7 @@ from riseg_drake.geometry.camera import rays
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.geometry.se3 import inverse, move_points
 from riseg_drake.segmentation.belief import Belief
-from riseg_drake.segmentation.bodies import Bodies
+from riseg_drake.segmentation.bodies import Bodies, points_in_view
 from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.frame_pairs import camera_span
 from riseg_drake.segmentation.look import EvidenceParameters, Look
@@ -48,17 +48,10 @@ def share_in_view(belief: Belief, bodies: Bodies, frame: Frame) -> float:
     In the measure of the keyframe's own holes, which lie elsewhere in each frame: dark things are seen half.
     """
     keyframe = belief.keyframe
-    every = slice(None, None, 1 + len(keyframe.owner) // 2000)
-    v, u = keyframe.points.pixel[:, every]
-    p_KQ = rays(keyframe.frame.intrinsics)[v, u] * keyframe.points.depth[every, None]
-    motion = bodies.motion[keyframe.owner[every]]
-    shown = 0
-    for k, X in enumerate(bodies.motions_K):
-        p_CQ = move_points(inverse(frame.X_WC) @ keyframe.frame.X_WC @ X, p_KQ[motion == k].astype(float))
-        (v, u), inside = (a.T for a in pixels_of(p_CQ, frame.intrinsics))
-        shown += int(np.count_nonzero(frame.unhidden_depth[v[inside], u[inside]] > 0))
+    owner, at, inside = points_in_view(keyframe, bodies, frame)
+    shown = np.count_nonzero(frame.unhidden_depth[tuple(at[inside].T)] > 0)
     measured = np.mean(keyframe.frame.depth[keyframe.above.mask] > 0)
-    return shown / max(1.0, len(p_KQ) * float(measured))
+    return shown / max(1.0, len(owner) * float(measured))
 
 
 def leaves_keyframe(now: Segmentation, bodies: Bodies, look: Look) -> bool:

@@ -6,11 +6,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from riseg_drake.geometry.camera import Intrinsics
 from riseg_drake.geometry.se3 import exp_se3, inverse, translation
 from riseg_drake.segmentation import bodies as module
 from riseg_drake.segmentation.belief import Belief, BeliefParameters
-from riseg_drake.segmentation.bodies import Bodies, bodies_of, rebased, standing
+from riseg_drake.segmentation.bodies import (
+    Bodies,
+    bodies_of,
+    confirmed,
+    points_in_view,
+    rebased,
+    standing,
+    unseen_kept,
+)
 from riseg_drake.segmentation.observation import Observation, ObservationParameters
+from riseg_drake.segmentation.propagation import UNKNOWN
 
 
 def test_how_bodies_had_moved_when_the_reference_was_taken_is_told_since_the_new_keyframe():
@@ -108,6 +118,22 @@ def test_ids_are_those_of_the_frames_before_and_new_ones_nobodys(before, latest,
     assert bodies.latest.tolist() == np.where(np.array(ids) > 0, ids, latest).tolist()
 
 
+@pytest.mark.parametrize(
+    ("latest", "following"),
+    [
+        ([1, 5, 0, 0], [1, 5, 0, 0]),  # what is one with the known 1 for now
+        ([1, 0, 0, 0], [1, 1, 0, 0]),  # what never was anything else
+        ([1, 5, 6, 0], [1, 5, 6, 0]),
+    ],
+)
+def test_what_is_one_with_something_known_keeps_the_id_that_it_had_for_itself(latest, following):
+    now = np.array([1, 1, 0, 0])
+    before = Bodies(now, np.array([1, 1, 0, 0]), STILL_AND_MOVED, 7, np.zeros((7, 7)), np.array(latest))
+    _, bodies = told(*a_row_of_four([1, 0, 0, 0]), before)
+    assert bodies.body.tolist() == [1, 1, 0, 0]
+    assert bodies.latest.tolist() == following
+
+
 def test_across_a_gap_all_of_both_parts_says_what_they_are_and_elsewhere_each_superpixel(monkeypatch):
     monkeypatch.setattr(module, "evidence_of_parts", lambda *_: np.array([9.0, -3.0, 9.0]))
     seen, _ = told(*a_row_of_four([0, 0, 0, 0], across=(False, True, False)))
@@ -142,3 +168,88 @@ def test_what_falls_off_its_body_is_no_more_held_apart_from_others_by_what_that_
     told, bodies = bodies_of(belief, seen, standing(belief), parameters, ObservationParameters())
     assert bodies.body.tolist() == ([1, 1, 2, 2] if forgets else [1, 1, 3, 2])
     assert told.strangers.tolist() == [False, False, forgets, False]
+
+
+CAMERA = Intrinsics(100, 100, 100.0, 100.0, 0.0, 0.0)
+"""At 1 m a pixel is a centimetre."""
+
+
+def two_blocks(shift):
+    """A keyframe of two blocks of 20 x 40 pixels at 1 m, columns 10 to 29 and 30 to 49, and how they moved:
+    id 5 by `shift` along x, m; id 6 stands still."""
+    v, u = (a.ravel() for a in np.mgrid[10:50, 10:50])
+    keyframe = SimpleNamespace(
+        frame=SimpleNamespace(intrinsics=CAMERA, X_WC=np.eye(4)),
+        owner=(u >= 30).astype(int),
+        points=SimpleNamespace(pixel=np.stack([v, u]), depth=np.ones(1600, np.float32)),
+        area=np.array([800, 800]),
+        pixels_per_metre=100.0,
+    )
+    motions = np.array([np.eye(4), translation(np.array([shift, 0, 0]))])
+    body = np.array([5, 6])
+    return keyframe, Bodies(body, np.array([1, 0]), motions, 7, np.zeros((7, 7)), body)
+
+
+def a_view(X_WC=None, robot=None):
+    hidden = np.zeros((100, 100), bool) if robot is None else robot
+    return SimpleNamespace(intrinsics=CAMERA, X_WC=np.eye(4) if X_WC is None else X_WC, robot=hidden)
+
+
+def test_points_in_view_are_where_their_bodies_have_gone_before_a_camera_that_has_moved():
+    keyframe, bodies = two_blocks(0.35)
+    frame = a_view(translation(np.array([0.05, -0.1, 0.0])))
+    owner, at, inside = points_in_view(keyframe, bodies, frame)
+    v, u = keyframe.points.pixel
+    np.testing.assert_array_equal(owner, keyframe.owner)
+    np.testing.assert_array_equal(at, np.stack([v + 10, u - 5 + np.where(owner == 0, 35, 0)], axis=1))
+    assert inside.all()
+    _, _, inside = points_in_view(keyframe, two_blocks(0.8)[1], frame)
+    np.testing.assert_array_equal(inside, (owner == 1) | (u + 75 < 100))
+
+
+def seen_elsewhere():
+    """What another frame says: both are one, and stand still."""
+    body = np.array([6, 6])
+    return Bodies(body, np.zeros(2, int), np.eye(4)[None], 7, np.zeros((7, 7)), body)
+
+
+@pytest.mark.parametrize(("least", "kept"), [(0.0399, False), (0.0401, True)])
+def test_what_has_left_the_picture_but_for_less_than_is_asked_keeps_its_id_and_motion(least, kept):
+    keyframe, before = two_blocks(0.8)  # 10 of its 20 columns are in the picture: 400 cm^2
+    now = seen_elsewhere()
+    told = unseen_kept(now, before, keyframe, a_view(), least)
+    if not kept:
+        assert told is now
+        return
+    np.testing.assert_array_equal(told.body, [5, 6])
+    np.testing.assert_allclose(told.motions_K[told.motion], before.motions_K[[1, 0]], atol=0)
+    np.testing.assert_array_equal(now.body, [6, 6])
+
+
+def test_what_is_behind_the_robot_keeps_its_motion_and_what_stands_still_has_none():
+    keyframe, before = two_blocks(0.3)
+    robot = np.zeros((100, 100), bool)
+    robot[:, 40:60] = True  # where id 5 is now
+    told = unseen_kept(seen_elsewhere(), before, keyframe, a_view(robot=robot), 1e-4)
+    np.testing.assert_array_equal(told.body, [5, 6])
+    robot[:, 40] = False  # 40 pixels
+    assert unseen_kept(seen_elsewhere(), before, keyframe, a_view(robot=robot), 39e-4).body[0] == 6
+    assert unseen_kept(seen_elsewhere(), before, keyframe, a_view(robot=robot), 41e-4).body[0] == 5
+    robot[:] = True
+    np.testing.assert_array_equal(
+        unseen_kept(seen_elsewhere(), before, keyframe, a_view(robot=robot), 1e-4).body, [5, 6]
+    )
+
+
+@pytest.mark.parametrize(
+    ("found_before", "least", "shown"), [(7, 4, [7, 6, 9]), (7, 5, [UNKNOWN, 6, 9]), (6, 4, [UNKNOWN, 6, 9])]
+)
+def test_a_new_id_is_shown_from_its_second_frame_on_where_enough_of_it_is_seen(found_before, least, shown):
+    label = np.array([[7, 7, 6, 0], [7, 7, 9, UNKNOWN]], np.uint16)  # 9 is remembered
+    now, still = np.array([7, 6]), np.zeros(2, int)
+    bodies = Bodies(now, still, np.eye(4)[None], 8, np.zeros((8, 8)), now)
+    before = replace(bodies, latest=np.array([found_before, 6]))
+    expected = np.array([[shown[0], shown[0], 6, 0], [shown[0], shown[0], 9, UNKNOWN]])
+    np.testing.assert_array_equal(confirmed(label, bodies, before, 7, least), expected)
+    # What was decided about is shown at once, and however little of it is seen.
+    np.testing.assert_array_equal(confirmed(label, bodies, before, 8, 100), label)

@@ -164,7 +164,11 @@ def test_of_boxes_that_stand_flush_the_one_that_is_pushed_has_an_id_before_any_r
         segmentation = watcher.take(frame).segmentation
         assert segmentation.belief.keyframe.frame.sequence == 0
         if sequence >= 2:  # from 1.5 pixels on
+            assert set(segmentation.bodies[sequence].body) == {0, 1}
+        if sequence >= 3:  # and shown from the second frame on
             assert intersection_over_union(segmentation.mask > 0, label == 2) > 0.93
+        else:
+            assert not segmentation.mask.any()
 
 
 def test_a_thing_that_leaves_its_place_unseen_in_motion_is_no_reason_to_decide_before_it_rests() -> None:
