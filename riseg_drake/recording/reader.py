@@ -204,6 +204,10 @@ class RecordingReader(RecordedSource):
                 f"{self._color_list}: line {color[0].line}: neither this stamp nor any other has a partner "
                 f"in {name} within {limit:g} s; compare the stamps, or allow more with --stamp-limit"
             )
+        for name, count in lonely.items():
+            if 2 * count > len(color):
+                odd = f"{count} of {len(color)} stamps have no partner in {name}: another clock, or unit?"
+                self.warnings.append(odd)
         return frames
 
     def _check_headers(self) -> None:
