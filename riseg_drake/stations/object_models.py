@@ -128,7 +128,9 @@ def parse_body(plant: MultibodyPlant, path: Path) -> RigidBody:
     except (ModelFileError, RuntimeError, ValueError, SystemExit) as error:  # SystemExit: Drake's assertions
         words = one_line(error)
         if "inertia" in words:
-            words = f"{words}; moments are kg m^2 about the centre of mass, each less than the two others"
+            words = (
+                f"{words}; moments are kg m^2 about the centre of mass, each less than the sum of the other two"
+            )
         raise SceneError(f"{path} cannot be read: {words}") from error
     bodies = [plant.get_body(index) for instance in instances for index in plant.GetBodyIndices(instance)]
     if len(bodies) != 1:

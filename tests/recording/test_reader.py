@@ -66,6 +66,16 @@ def test_stamps_belong_together_up_to_two_hundredths_of_a_second(folder):
     assert (len(wider), wider.left_out) == (2, [])
 
 
+def test_where_most_stamps_of_a_list_have_no_partner_its_clock_or_unit_is_in_doubt(folder):
+    listed(folder, "rgb.txt", [1.0, 2.0, 3.0, 4.0])
+    listed(folder, "depth.txt", [1.0, 2.0, 30.0, 40.0])
+    assert RecordingReader(folder).warnings == []
+    listed(folder, "depth.txt", [1.0, 20.0, 30.0, 40.0])
+    assert RecordingReader(folder).warnings == [
+        "3 of 4 stamps have no partner in depth.txt: another clock, or unit?"
+    ]
+
+
 def test_lines_that_are_not_newer_are_noted_of_every_list_in_which_they_stand(folder):
     both_listed(folder, [0.0, 0.5, 0.5])
     numbers(folder, "groundtruth.txt", (0.0, *POSE), (0.0, *POSE), (0.5, *POSE))

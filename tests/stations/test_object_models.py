@@ -79,6 +79,11 @@ INERTIA = "<mass>{m}</mass><inertia><ixx>{i}</ixx><iyy>{i}</iyy><izz>{i}</izz></
         ),
         ("<mass>0.2</mass>", CUBE.replace("0.0", "0.0000"), "6e-05 m long"),
         (INERTIA.format(m=200, i=0.1), None, "has mass 200; .* is it in grams"),
+        (
+            "<mass>0.2</mass><inertia><ixx>1.3</ixx><iyy>1e-4</iyy><izz>1e-4</izz></inertia>",
+            None,
+            "invalid inertia.*moments are kg m.2 .* each less than the sum of the other two",
+        ),
         (INERTIA.format(m=0.2, i=0.1), None, "moment of inertia of 0.1 kg m.2; .* it is 0.00063 at most"),
     ],
 )
@@ -188,6 +193,8 @@ def test_models_are_found_by_name_there_or_one_folder_down_and_no_deeper(tmp_pat
     for names in (["c"], ["b", "c"]):
         with pytest.raises(SceneError, match="no model c; there are b, low"):
             find_models(str(tmp_path), names)
+    with pytest.raises(SceneError, match=r"no model lwo; did you mean low\?"):
+        find_models(str(tmp_path), ["b", "lwo"])
     with pytest.raises(SceneError, match="both called b"):
         find_models([str(tmp_path), str(tmp_path)])
     with pytest.raises(SceneError, match="no folder; expected"):
