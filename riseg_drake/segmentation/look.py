@@ -19,6 +19,7 @@ from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.motion_search import MotionSearchParameters
 from riseg_drake.segmentation.observation import ObservationParameters
 from riseg_drake.segmentation.rest import RestParameters
+from riseg_drake.segmentation.scales import SMALLEST_SEEN
 from riseg_drake.segmentation.segmentation import Segmentation
 
 
@@ -46,6 +47,9 @@ class EvidenceParameters:
     fresh: float = 0.5
     """Share of a frame in motion in the running mean of their evidence, so that no single one parts a body or
     joins two; 1: each for itself."""
+    area_seen: float = SMALLEST_SEEN
+    """m^2; a body of which a frame in motion shows less is where it went before, and a new one is not shown yet; 0:
+    all are as that frame alone has them."""
     search_every: float = 0.13
     """s between two frames in motion in which a motion is looked for that no group proposes: what is blank."""
     memory: bool = True

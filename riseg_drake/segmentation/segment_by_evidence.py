@@ -55,7 +55,6 @@ from riseg_drake.segmentation.occasions import (
 from riseg_drake.segmentation.partition import as_tested, margins
 from riseg_drake.segmentation.propagation import UNKNOWN
 from riseg_drake.segmentation.rest import is_still
-from riseg_drake.segmentation.scales import SMALLEST_SEEN
 from riseg_drake.segmentation.segmentation import Segmentation
 from riseg_drake.segmentation.told_apart import identity_costs
 
@@ -116,7 +115,7 @@ def segment_by_evidence(
     if len(candidates_N) and not deciding:
         seen, bodies = _explained(belief, compared, candidates_N, bodies, parameters, now.said)
         now = replace(now, said=seen.evidence)
-        bodies = unseen_kept(bodies, _bodies_before(now), belief.keyframe, frame, SMALLEST_SEEN)
+        bodies = unseen_kept(bodies, _bodies_before(now), belief.keyframe, frame, parameters.area_seen)
         deciding = has_gone_far(now, look, seen, bodies)
     # What the next keyframe cannot be compared with any more is looked for now.
     leaves = bool(above_1.mask.any()) and leaves_keyframe(now, bodies, look)
@@ -230,7 +229,7 @@ def _carried(
     remembered = draw_memory(moved_memory(now.memory, moves, X_WK), frame)
     label = carry_bodies(drawn, bodies, frame, above, remembered)
     if not deciding:
-        least = SMALLEST_SEEN * above.pixels_per_metre(frame.intrinsics) ** 2
+        least = parameters.area_seen * above.pixels_per_metre(frame.intrinsics) ** 2
         label = confirmed(label, bodies, _bodies_before(now), belief.next_id, least)
     kept = {s: b for s, b in now.bodies.items() if s >= pair.reference.sequence}
     poses = {s: X for s, X in now.poses.items() if s >= pair.reference.sequence}

@@ -51,6 +51,7 @@ WITHOUT: dict[str, Switch] = {
     "what came to where nothing stood has not moved": {"segment.evidence.belief.arrivals": False},
     "what falls off a body stays what that was known to be": {"segment.evidence.belief.strangers": False},
     "each frame in motion says all it has": {"segment.evidence.fresh": 1.0},
+    "each frame in motion says where all is": {"segment.evidence.area_seen": 0.0},
     "what is seen in pieces is a body each": {"segment.evidence.belief.keyframe.pieces": False},
     "nothing is recognised": {"segment.evidence.search.recognition.most": 0},
     "alike motions count, however little is shown": {"segment.evidence.observation.touching": -2.0},
