@@ -48,8 +48,8 @@ class EvidenceParameters:
     """Share of a frame in motion in the running mean of their evidence, so that no single one parts a body or
     joins two; 1: each for itself."""
     area_seen: float = SMALLEST_SEEN
-    """m^2; a body of which a frame in motion shows less is where it went before, and a new one is not shown yet;
-    0: all are as that frame alone has them."""
+    """m^2; a body of which a frame in motion shows less is where it went, and a new one is not shown yet; 0:
+    all are as that frame alone has them."""
     search_every: float = 0.13
     """s between two frames in motion in which a motion is looked for that no group proposes: what is blank."""
     memory: bool = True
