@@ -228,7 +228,8 @@ def _carried(
         frame, above, drawn = look.frame, look.above, replace(belief, keyframe=now.views[0])
     remembered = draw_memory(moved_memory(now.memory, moves, X_WK), frame)
     label = carry_bodies(drawn, bodies, frame, above, remembered)
-    if not deciding:
+    # The first frame after the keyframe has none before it that could have found the same.
+    if not deciding and now.sequence > belief.keyframe.frame.sequence:
         least = parameters.area_seen * above.pixels_per_metre(frame.intrinsics) ** 2
         label = confirmed(label, bodies, _bodies_before(now), belief.next_id, least)
     kept = {s: b for s, b in now.bodies.items() if s >= pair.reference.sequence}

@@ -124,6 +124,7 @@ NOT_EXECUTED = {
     "sudo": "changes the machine",
     "pip": "changes the environment; tests/test_packaging.py installs the package",
     "python3": "makes an environment; tests/test_packaging.py has one of its own",
+    "franka/bin/python": "the Python of another environment; tests/stations/franka_rig.py starts the same",
     ".": "enters it",
     "export": "is the shell's own",
     "kill": "is the shell's own",
