@@ -19,6 +19,7 @@ from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
 from riseg_drake.app.meshcat_push import draw_push
 from riseg_drake.app.meshcat_stage import (
+    EYE,
     LABEL_HEIGHT,
     LABEL_LIFT,
     PANEL,
@@ -50,6 +51,8 @@ GAMMA = 2.2
 """Of the camera's pictures."""
 PICTURE_RATE = 2.0
 """How often the picture is renewed, 1/s."""
+PANEL_LIFT = 5e-5
+"""By how much each picture is nearer to who looks than the one before, m, so that it covers that."""
 PICTURE_WIDTH = 400
 """Of the panel's picture, pixels."""
 SMALL, DIFFERENT = (80, 60), 8
@@ -237,8 +240,10 @@ class MeshcatView(LeafSystem):
     def _show_panel(self, frame: Frame, segmentation: Segmentation, caption: str, time: float) -> None:
         path = f"/riseg/panel/{self._number}"
         set_card(self._meshcat, path, panel_picture(frame, segmentation, caption), PANEL_WIDTH)
-        self._meshcat.SetTransform(path, facing(on_stage(self._stage.centre_W, PANEL)))
-        self._turn_to("panel", path, time)
+        place = PANEL + self._number * PANEL_LIFT * (EYE - PANEL) / np.linalg.norm(EYE - PANEL)
+        self._meshcat.SetTransform(path, facing(on_stage(self._stage.centre_W, place)))
+        # Behind a new picture the two before it stay: a busy browser takes a second to read one.
+        self._turn_to(f"panel {self._number % 3}", path, time)
 
     def _show_points(self, points: Points, time: float) -> None:
         path = f"/riseg/points/{self._number}"

@@ -150,6 +150,35 @@ def test_a_picture_is_shown_anew_only_where_a_person_would_see_a_difference(fram
     assert panels(frames, Meshcat())[0] == shown
 
 
+class Watched:
+    """A Meshcat that remembers what is where, m, and what is shown."""
+
+    def __init__(self):
+        self.meshcat, self.p_W, self.shown = Meshcat(), {}, set()
+
+    def SetTransform(self, path, X, *time):
+        self.p_W[path] = X.translation()
+        self.meshcat.SetTransform(path, X, *time)
+
+    def SetProperty(self, path, name, value, *time):
+        if name == "visible":
+            (self.shown.add if value else self.shown.discard)(path)
+        self.meshcat.SetProperty(path, name, value, *time)
+
+    def __getattr__(self, name):
+        return getattr(self.meshcat, name)
+
+
+def test_a_new_picture_stands_a_little_before_the_last_and_the_two_before_it_stay():
+    watched = Watched()
+    assert panels([(90, 4), (150, 4), (210, 4), (30, 4), (90, 4)], watched)[0] == 5
+    places = np.array([watched.p_W[f"/riseg/panel/{number}"] for number in range(1, 6)])
+    towards_the_eye = on_stage((0.5, 0.0), EYE) - places[0]
+    towards_the_eye /= np.linalg.norm(towards_the_eye)
+    np.testing.assert_allclose(np.diff(places, axis=0), 4 * [5e-5 * towards_the_eye], atol=1e-9)
+    assert {path for path in watched.shown if "panel" in path} == {f"/riseg/panel/{k}" for k in (3, 4, 5)}
+
+
 def test_the_end_is_shown_whatever_was_shown_before():
     meshcat = Meshcat()
     number, view, context = panels([(90, 4)], meshcat)
