@@ -91,7 +91,7 @@ def bodies_of(
     found_before = np.bincount(part, keyframe.area * (belief.body > 0), len(motion))
     moved = (motion > 0) | (2 * found_before > np.bincount(part, keyframe.area, len(motion)))
     previous = [belief.body, before.body, before.latest]
-    next_id = max(belief.next_id, int(before.latest.max(initial=0)) + 1)
+    next_id = max(belief.next_id, *(int(ids.max(initial=0)) + 1 for ids in previous))
     body, next_id = with_ids(part, moved, keyframe.area, previous, next_id)
     free = parameters.partition.rigid_min
     told = with_lost(told, belief.body, body, next_id, seen.nats, keyframe.area, free)
@@ -116,10 +116,17 @@ def unseen_kept(bodies: Bodies, before: Bodies, keyframe: Keyframe, frame: Frame
     if not unseen.any():
         return bodies
     motions, of_motion = np.unique(before.motion[unseen], return_inverse=True)
-    body, motion = bodies.body.copy(), bodies.motion.copy()
-    body[unseen], motion[unseen] = before.body[unseen], len(bodies.motions_K) + of_motion
-    motions_K = np.concatenate([bodies.motions_K, before.motions_K[motions]])
-    return replace(bodies, body=body, motion=motion, motions_K=motions_K)
+    next_id = max(bodies.next_id, before.next_id)
+    motion = bodies.motion.copy()
+    motion[unseen] = len(bodies.motions_K) + of_motion
+    return Bodies(
+        body=np.where(unseen, before.body, bodies.body),
+        motion=motion,
+        motions_K=np.concatenate([bodies.motions_K, before.motions_K[motions]]),
+        next_id=next_id,
+        told=np.pad(bodies.told, (0, next_id - len(bodies.told))),
+        latest=np.where(unseen, before.latest, bodies.latest),
+    )
 
 
 def points_in_view(

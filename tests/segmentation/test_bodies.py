@@ -106,6 +106,7 @@ def test_what_has_moved_before_by_more_than_half_of_its_area_is_a_body_though_it
         ([5, 5, 0, 0], [5, 5, 0, 0], 3, [5, 5, 0, 0], 6),  # it is what it was in the frame before
         ([0, 0, 0, 7], [0, 0, 0, 7], 3, [8, 8, 0, 0], 9),  # 7 is gone, and nobody else's
         ([0, 0, 0, 7], [0, 0, 0, 7], 9, [9, 9, 0, 0], 10),
+        ([0, 0, 0, 7], [0, 0, 0, 0], 3, [8, 8, 0, 0], 9),  # what was one with something known is somebody, too
         ([0, 0, 0, 0], [5, 0, 0, 7], 3, [5, 5, 0, 0], 8),  # it was not seen to move in the frame before
         ([6, 0, 0, 0], [6, 5, 0, 0], 3, [6, 6, 0, 0], 7),  # the frame before comes first
     ],
@@ -224,6 +225,16 @@ def test_what_has_left_the_picture_but_for_less_than_is_asked_keeps_its_id_and_m
     np.testing.assert_array_equal(told.body, [5, 6])
     np.testing.assert_allclose(told.motions_K[told.motion], before.motions_K[[1, 0]], atol=0)
     np.testing.assert_array_equal(now.body, [6, 6])
+
+
+def test_where_more_ids_were_known_before_all_that_is_known_of_them_has_room():
+    keyframe, before = two_blocks(0.8)
+    before = replace(before, body=np.array([5, 6]), next_id=11, told=np.ones((11, 11)), latest=np.array([9, 6]))
+    now = replace(seen_elsewhere(), told=np.arange(49.0).reshape(7, 7))
+    told = unseen_kept(now, before, keyframe, a_view(), 0.05)
+    assert told.next_id == 11
+    assert told.latest.tolist() == [9, 6]
+    np.testing.assert_array_equal(told.told, np.pad(now.told, (0, 4)))
 
 
 def test_what_is_behind_the_robot_keeps_its_motion_and_what_stands_still_has_none():
