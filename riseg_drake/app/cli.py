@@ -84,6 +84,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
     from riseg_drake.recording.layout import RecordingError
     from riseg_drake.robot.camera_calibration import CalibrationError
     from riseg_drake.robot.own_robot import OwnRobotError
+    from riseg_drake.segmentation.table_plane import NoPlaneError
     from riseg_drake.stations.command_process import CommandError
     from riseg_drake.stations.franka_link import LinkError
     from riseg_drake.stations.lcm_channels import LcmError
@@ -106,6 +107,7 @@ def _mistakes() -> tuple[type[Exception], ...]:
         ThingsError,
         RecordingError,
         OwnRobotError,
+        NoPlaneError,
         EvaluationError,
         PoolError,
         LcmError,

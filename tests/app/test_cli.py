@@ -1,12 +1,15 @@
-"""What becomes of a command whose output nobody reads any more."""
+"""What becomes of a command whose output nobody reads any more, and of what is wrong."""
 
 import os
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from riseg_drake.app import cli
+from riseg_drake.geometry.camera import Intrinsics
+from riseg_drake.segmentation.table_plane import fit_plane
 
 
 @pytest.mark.renders
@@ -28,6 +31,15 @@ def test_any_other_broken_pipe_is_not_taken_for_success(monkeypatch):
     monkeypatch.setattr(cli, "nobody_reads", lambda: False)
     with pytest.raises(BrokenPipeError):
         cli.main(["diagram"])
+
+
+def test_a_picture_without_a_table_is_one_line_and_no_fault_of_the_program(monkeypatch, capsys):
+    def blind(*_: object) -> None:
+        fit_plane(np.zeros((8, 8), np.float32), Intrinsics(8, 8, 8.0, 8.0, 3.5, 3.5), np.random.default_rng(0))
+
+    monkeypatch.setattr("riseg_drake.app.commands.hand_eye", blind)
+    assert cli.main(["hand-eye"]) == 2
+    assert capsys.readouterr().err == "riseg: no plane: 0 pixels with depth, at least 3 are needed\n"
 
 
 @pytest.mark.parametrize("command", ["run", "evaluate", "hardware", "emulate", "bench", "pictures"])
