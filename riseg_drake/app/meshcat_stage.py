@@ -16,6 +16,11 @@ FIELD_OF_VIEW = 40.0
 PANEL = np.array([0.352, 0.0, 0.12])
 """The middle of the camera's picture, in front of the work area, where the arm is never between."""
 PANEL_WIDTH = 0.198  # m
+BOARD_OFFSET = np.array([0.215, 0.055])
+"""Of the list of all objects from the middle of that picture, right and up in its plane, m: a narrow window,
+which would have no room for it, ends before it, and a wide one has nothing there."""
+BOARD_SIZE = (0.19, 0.283)
+"""Width and height, m."""
 LABEL_HEIGHT = 0.014  # m
 LABEL_LIFT = 0.02
 """From the top of an object to the middle of its label, m."""
@@ -40,7 +45,16 @@ def on_stage(centre_W: Sequence[float], place: NDArray) -> NDArray[np.float64]:
 
 def facing(p_WK: NDArray) -> RigidTransform:
     """Pose of a card K at a point [3], m, that whoever looks from EYE to TARGET sees without distortion."""
+    return RigidTransform(_R_WK, p_WK)
+
+
+def _rotation_of_cards() -> RotationMatrix:
     ahead = (TARGET - EYE) / np.linalg.norm(TARGET - EYE)
     right = np.cross(ahead, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
-    return RigidTransform(RotationMatrix(np.column_stack([right, ahead, np.cross(right, ahead)])), p_WK)
+    return RotationMatrix(np.column_stack([right, ahead, np.cross(right, ahead)]))
+
+
+_R_WK = _rotation_of_cards()
+BOARD = PANEL + _R_WK @ np.array([BOARD_OFFSET[0], 0.0, BOARD_OFFSET[1]])
+"""The middle of that list."""

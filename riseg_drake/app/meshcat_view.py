@@ -19,6 +19,8 @@ from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
 from riseg_drake.app.meshcat_push import draw_push
 from riseg_drake.app.meshcat_stage import (
+    BOARD,
+    BOARD_SIZE,
     EYE,
     LABEL_HEIGHT,
     LABEL_LIFT,
@@ -30,7 +32,7 @@ from riseg_drake.app.meshcat_stage import (
 )
 from riseg_drake.geometry.camera import Intrinsics, back_project
 from riseg_drake.geometry.rgbd import NO_PAIR, Frame, FramePair
-from riseg_drake.pictures.cards import set_card, text_card, with_caption
+from riseg_drake.pictures.cards import board, set_card, text_card, with_caption
 from riseg_drake.pictures.masks import draw_masks
 from riseg_drake.pictures.object_colors import object_colors
 from riseg_drake.pushing.arm_path import ArmPhase
@@ -55,6 +57,8 @@ PANEL_LIFT = 5e-5
 """By how much each picture is nearer to who looks than the one before, m, so that it covers that."""
 PICTURE_WIDTH = 400
 """Of the panel's picture, pixels."""
+BOARD_WIDTH = 480
+"""Of the list of objects, pixels."""
 SMALL, DIFFERENT = (80, 60), 8
 """Two pictures of which no pixel differs by so many gray levels, shrunk to that size, look alike."""
 
@@ -164,6 +168,7 @@ class MeshcatView(LeafSystem):
         self._meshcat, self._stage = meshcat, stage
         self._visible: dict[str, str] = {}  # by kind ("panel", "push" and so on), the path that is shown now
         self._drawn: set[str] = set()  # the labels that there are, shown or not
+        self._boards: dict[tuple[str, ...], str] = {}  # the path of each list of objects that there is
         self._labelled: set[int] = set()  # ids that have, or had, a label
         self._sequence = -1
         self._sight: _Sight | None = None
@@ -223,6 +228,7 @@ class MeshcatView(LeafSystem):
         points = points_of(frame, segmentation.mask)
         self._show_points(points, time)
         self._show_labels(points, segmentation, time)
+        self._show_board(segmentation, time)
 
     def _show_push(self, push: Push, step: int, time: float) -> None:
         if push is not self._push:
@@ -267,6 +273,18 @@ class MeshcatView(LeafSystem):
                 self._meshcat.SetTransform(path, facing(tops[object_id] + [0.0, 0.0, LABEL_LIFT]), time)
             self._turn_to(f"label {object_id}", path, time)
 
+    def _show_board(self, segmentation: Segmentation, time: float) -> None:
+        """What the labels say, as a list: things hide each other, and their labels are small."""
+        title, texts = count_of(segmentation), label_texts(segmentation)
+        words = (title, *texts.values())
+        if words not in self._boards:
+            path = self._boards[words] = f"/riseg/board/{len(self._boards) + 1}"
+            width, height = BOARD_SIZE
+            card = board(title, texts, (round(BOARD_WIDTH * height / width), BOARD_WIDTH))
+            set_card(self._meshcat, path, card, width)
+            self._meshcat.SetTransform(path, facing(on_stage(self._stage.centre_W, BOARD)))
+        self._turn_to("board", self._boards[words], time)
+
     def _turn_to(self, kind: str, path: str, time: float) -> None:
         """Show one path of a kind instead of the one that was shown until now."""
         before = self._visible.get(kind, "")
@@ -283,17 +301,18 @@ class MeshcatView(LeafSystem):
 
 def caption_of(interaction: int, phase: ArmPhase, segmentation: Segmentation) -> str:
     """Where the run is, in one line."""
-    number = len(segmentation.object_ids)
-    return f"interaction {interaction}, {phase.value}: {number} {'object' if number == 1 else 'objects'} found"
+    return f"interaction {interaction}, {phase.value}: {count_of(segmentation)}"
 
 
 def ending_of(interactions: int, segmentation: Segmentation) -> str:
     """That a run is over, in one line."""
+    return f"ended after {interactions} interaction{'' if interactions == 1 else 's'}: {count_of(segmentation)}"
+
+
+def count_of(segmentation: Segmentation) -> str:
+    """How many objects were found, in words."""
     number = len(segmentation.object_ids)
-    return (
-        f"ended after {interactions} interaction{'' if interactions == 1 else 's'}: "
-        f"{number} {'object' if number == 1 else 'objects'} found"
-    )
+    return f"{number} {'object' if number == 1 else 'objects'} found"
 
 
 def label_texts(segmentation: Segmentation) -> dict[int, str]:

@@ -6,6 +6,7 @@ also in a replay.
 
 import json
 from base64 import b64encode
+from collections.abc import Mapping
 from functools import cache
 from io import BytesIO
 
@@ -20,6 +21,8 @@ from riseg_drake.pictures.object_colors import object_colors
 _QUALITY = 80
 """Of a card's JPEG."""
 _PAPER, _INK = (28, 31, 36), (245, 245, 245)
+_LINES = 8
+"""For which a board has room at full size, its title and the room around them among them."""
 _TEXT = 30
 """Height of a line of text, pixels."""
 _PAD = 10
@@ -65,6 +68,25 @@ def with_caption(picture: NDArray[np.uint8], text: str) -> NDArray[np.uint8]:
     card = Image.new("RGB", (width, height + bar), _PAPER)
     card.paste(Image.fromarray(picture))
     ImageDraw.Draw(card).text((bar * 3 / 8, height + bar / 2), text, _INK, font, anchor="lm")
+    return np.asarray(card)
+
+
+def board(title: str, rows: Mapping[int, str], shape: tuple[int, int]) -> NDArray[np.uint8]:
+    """A card [H, W, 3] of a `shape` H, W, with a line for each object behind a field in its colour; all of them
+    fit, and one that is alone is no larger than the title."""
+    height, width = shape
+    line = height / max(_LINES, len(rows) + 2)
+    size = line / 2
+    widest = max((_font(size).getbbox(text)[2] for text in (title, *rows.values())), default=0)
+    font = _font(min(size, size * (width - 3 * line) / max(widest, 1)))
+    card = Image.new("RGB", (width, height), _PAPER)
+    draw = ImageDraw.Draw(card)
+    draw.text((line / 2, line), title, _INK, font, anchor="lm")
+    for number, (object_id, text) in enumerate(rows.items()):
+        y = (number + 1.5) * line
+        color = tuple(int(value) for value in object_colors(np.array(object_id)))
+        draw.rectangle((line / 2, y + line / 8, 1.25 * line, y + line * 7 / 8), color)
+        draw.text((1.75 * line, y + line / 2), text, _INK, font, anchor="lm")
     return np.asarray(card)
 
 

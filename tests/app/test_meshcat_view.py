@@ -6,7 +6,17 @@ from pydrake.geometry import Meshcat
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from riseg_drake.app.meshcat_stage import EYE, PANEL, TARGET, facing, on_stage
+from riseg_drake.app.meshcat_stage import (
+    BOARD,
+    BOARD_SIZE,
+    EYE,
+    FIELD_OF_VIEW,
+    PANEL,
+    PANEL_WIDTH,
+    TARGET,
+    facing,
+    on_stage,
+)
 from riseg_drake.app.meshcat_view import (
     GAMMA,
     MeshcatView,
@@ -19,12 +29,13 @@ from riseg_drake.app.meshcat_view import (
 )
 from riseg_drake.geometry.camera import Intrinsics, back_project
 from riseg_drake.geometry.rgbd import Frame, FramePair
-from riseg_drake.pictures.cards import set_card, with_caption
+from riseg_drake.pictures.cards import board, set_card, with_caption
 from riseg_drake.pictures.object_colors import object_colors
 from riseg_drake.pushing.arm_path import ArmPhase
 from riseg_drake.pushing.push import NO_PUSH
 from riseg_drake.segmentation.partition import Margins
 from riseg_drake.segmentation.segmentation import Segmentation
+from tests.browser import NARROW, WIDE
 
 INTRINSICS = Intrinsics(30, 30, 30.0, 30.0, 15.0, 15.0)
 
@@ -128,7 +139,8 @@ def panels(frames, meshcat):
     for tick, (gray, object_id) in enumerate(frames):
         seen = replace(frame(), sequence=tick, color=np.full((30, 30, 3), gray, np.uint8))
         diagram.GetInputPort("pair").FixValue(context, FramePair(seen, seen))
-        diagram.GetInputPort("segmentation").FixValue(context, Segmentation(tick, mask_of(object_id)))
+        found = Segmentation(tick, mask_of(object_id), Margins({object_id: 1.0}, {object_id: 9.0}))
+        diagram.GetInputPort("segmentation").FixValue(context, found)
         simulator.AdvanceTo(0.5 * tick + 0.1)
     number = 0
     while meshcat.HasPath(f"/riseg/panel/{number + 1}"):
@@ -201,3 +213,50 @@ def test_a_card_is_an_object_of_the_scene():
     meshcat = Meshcat()
     set_card(meshcat, "/card", np.zeros((3, 4, 3), np.uint8), 0.2)
     assert meshcat.HasPath("/card")
+
+
+def corners(middle, width, height):
+    """Of a card at a place on the stage, as points [4, 3] from its middle's, m."""
+    R = facing(middle).rotation().matrix()
+    across, up = R[:, 0] * width / 2, R[:, 2] * height / 2
+    return middle + np.array([a * across + b * up for a in (-1, 1) for b in (-1, 1)])
+
+
+def in_window(points, size):
+    """Whether points [N, 3] of the stage are seen in a window of a size, pixels, by pinhole projection."""
+    R = facing(EYE).rotation().matrix()
+    right, ahead, up = ((points - EYE) @ R).T
+    half = np.tan(np.radians(FIELD_OF_VIEW / 2))
+    return (np.abs(up / ahead) < half) & (np.abs(right / ahead) < half * size[0] / size[1])
+
+
+def test_a_wide_window_shows_picture_and_list_and_a_narrow_one_the_picture_alone():
+    picture = corners(PANEL, PANEL_WIDTH, PANEL_WIDTH * 350 / 400)
+    of_list = corners(BOARD, *BOARD_SIZE)
+    for size in (WIDE, NARROW):
+        assert in_window(picture, size).all()
+    assert in_window(of_list, WIDE).all()
+    assert not in_window(of_list, NARROW).any()
+    # They do not cover each other: from the left, the picture ends before the list begins.
+    right = facing(EYE).rotation().matrix()[:, 0]
+    assert (picture @ right).max() + 0.01 < (of_list @ right).min()
+
+
+@pytest.mark.parametrize("count", [1, 6, 7, 25])
+def test_a_list_has_a_field_for_each_object_in_its_colour_from_above_and_all_fit(count):
+    card = board("some found", {a: f"{a}  50 %  in doubt" for a in range(1, count + 1)}, (720, 480))
+    assert card.shape == (720, 480, 3)
+    line = 720 / max(8, count + 2)
+    middles = np.rint((np.arange(count) + 2) * line).astype(int)
+    colors = np.array([object_colors(np.array(a)) for a in range(1, count + 1)])
+    np.testing.assert_array_equal(card[middles, round(0.9 * line)], colors)
+    empty = card[0, 0]
+    assert (card[-round(line / 2) :] == empty).all()
+    assert (card[:, -round(line / 4) :] == empty).all()
+
+
+def test_the_list_is_drawn_once_for_the_same_words():
+    meshcat = Meshcat()
+    panels([(90, 4), (150, 4), (210, 5), (30, 4)], meshcat)
+    assert meshcat.HasPath("/riseg/board/2")
+    assert not meshcat.HasPath("/riseg/board/3")
