@@ -61,6 +61,8 @@ def picture_of_readme(url, file):
         page.wait(SETTLED)
         turn_to(page, README_SHARE)
         page.ask(f"document.head.insertAdjacentHTML('beforeend', '{HIDDEN}')")
+        # At this width the list would be cut.
+        page.ask("viewer.scene_tree.find(['riseg', 'board']).object.visible = false")
         page.picture(file.with_suffix(".png"))
     with Image.open(file.with_suffix(".png")) as picture:
         picture.convert("RGB").save(file, quality=86)
