@@ -101,6 +101,7 @@ def add_stages(
     wire(memory, "above_table", motion)
     wire(memory, "pose_error", motion)
     wire(motion, "pair", expected, grouper, propagator)
+    wire(motion, "pair", memory, port="settled_pair")
     wire(expected, "expected_flow", grouper, propagator)  # lines 1
     wire(optical, "optical_flow", grouper, propagator)  # and 2
     wire(memory, "above_table_reference", optical, grouper, port="above_table")

@@ -120,6 +120,8 @@ class FramePair(Immutable):
     current: Frame
     residual: float = 0.0
     """Standard deviation of O_t - E_t where nothing moves, pixels, as far as it was measured."""
+    given_residual: float = 0.0
+    """The same by the poses as they came, pixels of the whole frame; 0 where that was not asked."""
     span: float = 0.0
     """Effective flow that the reference and the frame before `current` turned out to span, pixels: so far
     had things moved."""

@@ -33,10 +33,32 @@ def _stood(
     return bool(-near < apart < near and nearest(whole_0, u, v) != whole)
 
 
+@compiled()
+def _turned_away(
+    undone: NDArray[np.float32],
+    u: Real,
+    v: Real,
+    z: Real,
+    depth_0: NDArray[np.float32],
+    near: Real,
+    whole_0: NDArray[np.int32],
+    whole: int,
+) -> bool:
+    """Whether what is seen at (u, v) and depth z, m, has come by the motion of the point that it hides from
+    where it was seen, within `near`, and is of the same `whole`, as far as that is known: a body that turns
+    hides what it showed."""
+    u, v, c = placed(undone, np.floor(u + np.float32(0.5)), np.floor(v + np.float32(0.5)), 1 / z)
+    came_from = nearest(whole_0, u, v)
+    of_one = came_from == whole or (came_from < 0 and whole < 0)
+    apart = nearest(depth_0, u, v) - c * z
+    return bool(of_one and -near < apart < near)
+
+
 @compiled(
     "UniTuple(float64[::1], 3)(float32[:, ::1], float32[::1], float32[::1], intp[::1], intp, float32[:, ::1],"
-    "float32[::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], int32[:, ::1],"
-    "int32[::1], float64, float64, float64, float64, float64, float64, float64, float64)"
+    "float32[::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], boolean,"
+    "float32[:, ::1], int32[:, ::1], int32[::1], float64, float64, float64, float64, float64, float64, float64,"
+    "float64)"
 )
 def misfits(
     pixel: NDArray[np.float32],
@@ -49,6 +71,8 @@ def misfits(
     gray_1: NDArray[np.float32],
     depth_1: NDArray[np.float32],
     back: NDArray[np.float32],
+    undone: NDArray[np.float32],
+    tilts: bool,
     depth_0: NDArray[np.float32],
     whole_0: NDArray[np.int32],
     whole: NDArray[np.int32],
@@ -79,6 +103,8 @@ def misfits(
         gray_1: [H, W], of the other view; NaN where there is nothing to compare.
         depth_1: [H, W], m; 0 where there is none.
         back: [3, 4], as M, from the other view to this, for what stands still.
+        undone: [3, 4], the same for what has moved.
+        tilts: whether it has turned about more than the table's normal.
         depth_0: [H, W], of this view, m.
         whole_0: [H, W], of this view: which number each known whole has, whose parts do not hide each other.
         whole: [N], of each superpixel.
@@ -107,10 +133,12 @@ def misfits(
         z, z_1 = c / pixel[3, n], nearest(depth_1, u, v)
         variance = (depth_noise * z * z) ** 2 + (depth_error * z) ** 2
         in_front = 0 < z_1 < z - nearer and (z_1 - z) ** 2 > most * variance
-        if (
-            in_front
-            and _stood(back, u, v, z_1, depth_0, nearer, whole_0, whole[p])
-            and not _sinks(rises, pixel, n, nearer / 2)
+        if in_front and (
+            (tilts and _turned_away(undone, u, v, z_1, depth_0, nearer / 2, whole_0, whole[p]))
+            or (
+                _stood(back, u, v, z_1, depth_0, nearer, whole_0, whole[p])
+                and not _sinks(rises, pixel, n, nearer / 2)
+            )
         ):
             after[n] = np.nan
             covered[p] += 1

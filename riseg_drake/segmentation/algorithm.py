@@ -108,6 +108,7 @@ def segment_objs(
         before.groups.flow_span,
         parameters.frame_pair,
         parameters.camera_motion,
+        before.pair.given_residual,
     )
     if remembered is before.remembered:
         return before

@@ -44,8 +44,10 @@ def with_arrivals(
         area_min: pixels of what is large enough for a body.
         next_id: the first that is free.
     """
-    whole, known, came = (np.bincount(part, each * area) for each in (1, body > 0, come))
-    fresh = np.flatnonzero((known == 0) & (came > _MOST * whole) & (whole >= area_min))
-    id_of = np.zeros(len(whole), np.intp)
+    known, unknown, came = (
+        np.bincount(part, each * area) for each in (body > 0, body == 0, come & (body == 0))
+    )
+    fresh = np.flatnonzero((known < unknown) & (came > _MOST * unknown) & (unknown >= area_min))
+    id_of = np.zeros(len(known), np.intp)
     id_of[fresh] = next_id + np.arange(len(fresh))
-    return np.where(id_of[part] > 0, id_of[part], body), next_id + len(fresh)
+    return np.where(body > 0, body, id_of[part]), next_id + len(fresh)

@@ -8,8 +8,10 @@ frames is set right by what does not move, as far as poses may err, and what the
 expected and observed flow is the noise above which something moves.
 
 A table tells less than it seems to where depth errs smoothly and differently from each view: it tilts by a
-degree between two frames of a camera that stands still. So the images have the last word: a correction that
-leaves more between expected and observed flow than there was before is none.
+degree between two frames of a camera that stands still. So the images have the last word: where they leave a
+fraction of a pixel between expected and observed flow, in this pair or whenever nothing moves, the poses are
+exact, and a correction that leaves more than there was before is none. Else things that move on a blank table
+would be what stands still.
 """
 
 from dataclasses import dataclass, replace
@@ -37,6 +39,8 @@ _STILL_TABLE, _STILL_ALL = 0.75, 0.5
 """Shares of the points of the table, and of all points, that surely stand still. What is left between expected
 and observed flow has long tails, since depth errs; its standard deviation is read off as far out as what moves
 may allow."""
+_AT_REST, _FEWEST = 0.25, 4
+"""Of the last frames in at least this share nothing moves; and so many it takes to say what they leave then."""
 _FIT_ROUNDS, _HYPOTHESES, _VOTERS = 5, 128, 500
 
 
@@ -70,6 +74,13 @@ class PoseError(Immutable):
     """Sum of squared changes of its height, m^2."""
     frames: float = 0.0
     """How many frames that is; old ones count less and less."""
+    left: tuple[float, ...] = ()
+    """What the images left of the last motions by the poses as they came, pixels of the whole frame."""
+
+    @property
+    def by_images(self) -> float:
+        """Pixels of the whole frame by which what stands still seems to move; inf where too little is known."""
+        return float(np.quantile(self.left, _AT_REST)) if len(self.left) >= _FEWEST else np.inf
 
     def sigma(self, confidence: float) -> tuple[float, float]:
         """Upper ends of the standard deviations of rotation, rad, and translation, m, of each axis."""
@@ -105,8 +116,12 @@ def renewed_pose_error(
     after: Frame,
     above_1: AboveTable,
     parameters: CameraMotionParameters,
+    left: float = 0.0,
 ) -> PoseError:
-    """The poses' error in the light of one more frame."""
+    """The poses' error in the light of one more frame, and of what the images have `left` of the motion before
+    it, pixels of the whole frame; 0: nothing was asked."""
+    if left > 0:
+        known = replace(known, left=(*known.left, left)[-round(parameters.frames) :])
     if np.array_equal(before.X_WC, after.X_WC):
         return known  # a camera that stands still says nothing about how it moves
     tilt, height, _, _ = table_change(before, above_0.plane_W, after, above_1.plane_W)
@@ -117,7 +132,8 @@ def renewed_pose_error(
     if known.frames == 0:
         most_R = most_p = np.inf
     kept = max(0.0, 1 - 1 / parameters.frames)
-    return PoseError(
+    return replace(
+        known,
         tilt_squares=kept * known.tilt_squares + min(float(tilt @ tilt), 2 * most_R),
         height_squares=kept * known.height_squares + min(height**2, most_p),
         frames=kept * known.frames + 1,
@@ -162,11 +178,16 @@ def settled_pair(
         apart = uv_1[judges] - project(move_points(X_C1C0, p_C0Q[judges]), intrinsics)
         return float(np.quantile(np.abs(apart), still) / norm.ppf(0.5 + still / 2))
 
+    given = residual(pair.X_C1C0)
+    reduction = pair.current.reduction
+    pair = replace(pair, given_residual=given * reduction)
+    if min(pair.given_residual, error.by_images) < parameters.exact:
+        return replace(pair, residual=min(given, error.by_images / reduction))
     tried = [pair.X_C1C0]
     for believed in (change, None) if same_plane else (None,):
         V = _fit(p_C0Q, uv_1, residual_sigma, pair, believed, (sigma_R, sigma_p), parameters)
         tried.append(exp_se3(V) @ pair.X_C1C0)
-    left = [residual(X_C1C0) for X_C1C0 in tried]
+    left = [given, *map(residual, tried[1:])]
     best = int(np.argmin(left))
     current = pair.current
     if best > 0:

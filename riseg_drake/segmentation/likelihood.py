@@ -10,12 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from riseg_drake.geometry.se3 import inverse
 from riseg_drake.kernels.misfits import misfits
 from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.expected_flow import of_pixels, pixel_projection
 from riseg_drake.segmentation.keyframe import Keyframe
 from riseg_drake.segmentation.scales import CORRELATED_DEPTH, CORRELATED_GRAY, EXPECTED, HIDDEN, OUTLIER
 
+_TILTS = 0.1
+"""Sine of an angle by which things that slide and turn on a table hardly tilt."""
 _SEEN = 0.25
 """Pixels of motion that an image shows."""
 _NEARER = 0.01
@@ -37,6 +40,9 @@ class LikelihoodParameters:
     turn."""
     light_still: float = 0.02
     """The same where nothing moves: shading stays what it was."""
+    light_tilt: float = 0.6
+    """So much more of it for the sine of the angle by which things tilt, or roll, as they are lit anew. Set by
+    hand."""
     light_view: float = 0.2
     """So much more of it from another view, where gloss shows other lights."""
     shadow: float = 2.0
@@ -145,8 +151,10 @@ def motion_costs(
     for k, motion in enumerate(motions_K):
         still = np.array_equal(motion, np.eye(4))
         light = np.hypot(parameters.light_still if still else parameters.light, seen_otherwise)
+        tilt = _tilt(keyframe, motion)
+        light = np.hypot(light, parameters.light_tilt * tilt)
         factors = depth_factors if still else np.ones(1)
-        tries = [_misfit(compared, motion, factor, float(light), parameters) for factor in factors]
+        tries = [_misfit(compared, motion, factor, float(light), tilt, parameters) for factor in factors]
         misfit[k] = np.min([each for each, _, _ in tries], axis=0)
         _, lost[k], covered[k] = tries[0]
     return Costs(misfit, keyframe.point_count.astype(float), lost, covered, compared.leaves)
@@ -174,6 +182,7 @@ def _misfit(
     motion_K: NDArray[np.float64],
     depth_factor: float,
     light: float,
+    tilt: float,
     parameters: LikelihoodParameters,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Mean squared residuals [N] of a motion [4, 4], the share [N] of points that cannot be compared, and that
@@ -196,6 +205,8 @@ def _misfit(
         frame.unhidden_gray,
         frame.unhidden_depth,
         compared.back,
+        pixel_projection(inverse(compared.X_C1K @ motion_K), frame.intrinsics),
+        tilt > _TILTS,
         keyframe.frame.depth,
         compared.whole_image,
         compared.whole,
@@ -210,6 +221,12 @@ def _misfit(
     )
     points = np.maximum(keyframe.point_count, 1)
     return np.where(keyframe.point_count > 0, total / points, EXPECTED), lost / points, covered / points
+
+
+def _tilt(keyframe: Keyframe, motion_K: NDArray[np.float64]) -> float:
+    """Sine of the angle by which a motion [4, 4] turns what was across the table."""
+    n_K = keyframe.frame.X_WC[:3, :3].T @ keyframe.above.plane_W[:3]
+    return float(np.linalg.norm(np.cross(n_K, motion_K[:3, :3] @ n_K)))
 
 
 def _rises(keyframe: Keyframe, motion_K: NDArray[np.float64]) -> NDArray[np.float32]:

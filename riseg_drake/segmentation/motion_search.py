@@ -1,8 +1,8 @@
 """From rest to rest: how did that move which no known motion explains? Looked for, not tracked.
 
-Things that are pushed over a table slide and turn on it: three numbers, and a push is short. So all of them
-are tried on a grid, for a small patch of what is not explained, which mostly lies on one body; the best few
-are sharpened, on ever more of what they explain. A patch of a blank thing tells little: so the same is done
+Things that are pushed over a table slide and turn on it, or roll: three numbers, and a push is short. So all
+of them are tried on a grid, for a small patch of what is not explained, which mostly lies on one body; the best
+few are sharpened, on ever more of what they explain. A patch of a blank thing tells little: so the same is done
 with all of what may be one body, whose outline and height tell.
 """
 
@@ -26,6 +26,7 @@ from riseg_drake.segmentation.likelihood import (
 )
 from riseg_drake.segmentation.motions import flow_difference
 from riseg_drake.segmentation.recognition import RecognitionParameters, recognised_motions
+from riseg_drake.segmentation.rolls import rolling_axes, rolls, surface_normals
 from riseg_drake.segmentation.slides import SlideCosts, slides
 from riseg_drake.segmentation.superpixels import label_middles
 
@@ -40,6 +41,8 @@ class MotionSearchParameters:
     """m, between two shifts: some pixels, within which a motion is sharpened."""
     turn: float = 0.56
     """rad; the largest turn."""
+    roll: float = 0.84
+    """rad; the farthest roll of what is round, in as many steps: most of what was seen is in sight still."""
     turn_step: float = 0.14
     """rad, between two turns: a step at the rim of a patch."""
     patch: float = 0.022
@@ -277,7 +280,7 @@ class Search:
         return motion_costs(self._compared, motion[None], self._likelihood)
 
     def _valleys(self, patch: NDArray[np.bool_], samples: int) -> list[NDArray]:
-        """The best motions [4, 4] on the grid of slides and turns."""
+        """The best motions [4, 4] on the grids of slides and turns, and of rolls where they are round."""
         parameters, keyframe = self._parameters, self._keyframe
         point = np.flatnonzero(patch[keyframe.owner])
         if len(point) < parameters.samples // 3:
@@ -289,14 +292,21 @@ class Search:
         shifts = np.arange(-parameters.reach, parameters.reach + 1e-9, parameters.step)
         turns = np.arange(-parameters.turn, parameters.turn + 1e-9, parameters.turn_step)
         grid = np.stack(np.meshgrid(shifts, shifts, turns, indexing="ij"), axis=-1)
-        motions = slides(self._normal, p_KQ.mean(0), grid.reshape(-1, 3))
-        cost = self._slides.of(p_KQ, v, u, motions)
-        if len(beside):
-            cost += self._slides.taken(beside, motions)
-        cost = cost.reshape(grid.shape[:3])
-        lowest = np.flatnonzero((cost == minimum_filter(cost, 5)).ravel())
-        order = lowest[np.argsort(cost.ravel()[lowest])][: parameters.best]
-        return list(motions[order])
+        amounts = grid.reshape(-1, 3)
+        grids = [slides(self._normal, p_KQ.mean(0), amounts)]
+        normals = surface_normals(keyframe.frame, keyframe.image_of(patch), v, u)
+        axes = rolling_axes(p_KQ, normals, self._normal)
+        grids += [
+            rolls(axis, self._normal, amounts * [1, 1, parameters.roll / parameters.turn]) for axis in axes
+        ]
+        valleys = []
+        for k, motions in enumerate(grids):
+            cost = self._slides.of(p_KQ, v, u, motions, lit_anew=k > 0)
+            if len(beside):
+                cost += self._slides.taken(beside, motions)
+            lowest = np.flatnonzero(cost == minimum_filter(cost.reshape(grid.shape[:3]), 5).ravel())
+            valleys += [(cost[n], motions[n]) for n in lowest]
+        return [motion for _, motion in sorted(valleys, key=lambda valley: valley[0])[: parameters.best]]
 
     def _beside(self, patch: NDArray[np.bool_], p_KQ: NDArray, samples: int) -> NDArray[np.float64]:
         """Points [S, 3] at a patch's height in the free space beside it, which moves with it."""

@@ -39,6 +39,7 @@ def with_frame(
     flow_span: float,
     pairs: FramePairParameters,
     camera_motion: CameraMotionParameters,
+    left: float = 0.0,
 ) -> RememberedPair:
     """The memory with one more frame, which gets the next number; the memory itself if the frame is not newer.
 
@@ -49,6 +50,7 @@ def with_frame(
         flow_span: effective flow found in the pair that is in memory, pixels.
         pairs: which frame is its partner.
         camera_motion: how the poses' error is estimated.
+        left: `given_residual` of the pair that is in memory, pixels.
     """
     if frame.time <= memory.pair.current.time:  # as that of NO_FRAME always is
         return memory
@@ -58,6 +60,6 @@ def with_frame(
     pair = with_equal_exposure(next_pair(memory.pair, frame, flow_span, pairs))
     above_0 = memory.above_0 if pair.reference is memory.pair.reference else memory.above_1
     error = renewed_pose_error(
-        memory.pose_error, memory.pair.current, memory.above_1, pair.current, above, camera_motion
+        memory.pose_error, memory.pair.current, memory.above_1, pair.current, above, camera_motion, left
     )
     return RememberedPair(pair, above_0, above, error)

@@ -1,6 +1,7 @@
 """How badly many slides and turns on a plane explain some points, all at once and in blurred images.
 
-There a step of a grid of motions leads into the right valley, which others go down.
+There a step of a grid of motions leads into the right valley, which others go down. What rolls is lit anew, and
+light that glances off it stays where it is: there only what is printed is compared, without what is broad.
 """
 
 import cv2
@@ -11,6 +12,8 @@ from riseg_drake.geometry.se3 import skew
 from riseg_drake.segmentation.comparison import Comparison
 from riseg_drake.segmentation.likelihood import EXPECTED
 
+_BROAD = 3.0
+"""Standard deviations of the blur, within which gray values differ by what is printed rather than by light."""
 _AT_ONCE = 256
 """Motions, about, that are tried at once."""
 
@@ -24,20 +27,29 @@ class SlideCosts:
         self._compared, self._residual_max = compared, residual_max
         gray_0 = compared.keyframe.frame.gray
         self._gray_0, self._gray_1 = (cv2.GaussianBlur(g, (0, 0), blur) for g in (gray_0, compared.frame.gray))
+        self._printed_0, self._printed_1 = (
+            g - cv2.GaussianBlur(g, (0, 0), _BROAD * blur) for g in (self._gray_0, self._gray_1)
+        )
         gradient = np.hypot(*(cv2.Sobel(gray_0, cv2.CV_32F, *d, scale=0.125) for d in ((1, 0), (0, 1))))
         self._variance = 8 + (0.5 * blur * cv2.GaussianBlur(gradient, (0, 0), blur)) ** 2
         self._standing = standing.astype(np.float32)
 
-    def of(self, p_KQ: NDArray, v: NDArray, u: NDArray, motions_K: NDArray) -> NDArray:
+    def of(
+        self, p_KQ: NDArray, v: NDArray, u: NDArray, motions_K: NDArray, *, lit_anew: bool = False
+    ) -> NDArray:
         """Mean squared residuals [G] under motions [G, 4, 4] of points [S, 3], m, at pixels v, u [S]."""
-        gray_0, variance = self._gray_0[v, u], self._variance[v, u]
-        return np.concatenate([self._costs(p_KQ, gray_0, variance, some) for some in _some_at_once(motions_K)])
+        image_0, image_1 = (self._printed_0, self._printed_1) if lit_anew else (self._gray_0, self._gray_1)
+        gray_0, variance = image_0[v, u], self._variance[v, u]
+        parts = (self._costs(p_KQ, gray_0, image_1, variance, some) for some in _some_at_once(motions_K))
+        return np.concatenate(list(parts))
 
-    def _costs(self, p_KQ: NDArray, gray_0: NDArray, variance: NDArray, motions_K: NDArray) -> NDArray:
-        """The same of points with gray values and variances [S]."""
+    def _costs(
+        self, p_KQ: NDArray, gray_0: NDArray, image_1: NDArray, variance: NDArray, motions_K: NDArray
+    ) -> NDArray:
+        """The same of points with gray values and variances [S], in an image [H, W]."""
         frame, most = self._compared.frame, np.float32(self._residual_max)
         u_1, v_1, z = self._places(p_KQ, motions_K)
-        cost = cv2.remap(self._gray_1, u_1, v_1, cv2.INTER_LINEAR, borderValue=0)
+        cost = cv2.remap(image_1, u_1, v_1, cv2.INTER_LINEAR, borderValue=0)
         cost -= gray_0
         cost *= cost
         cost /= variance
@@ -84,12 +96,22 @@ def slides(normal: NDArray, centre: NDArray, amounts: NDArray) -> NDArray[np.flo
     """Motions [G, 4, 4] of things on a plane: shifted along it by two of `amounts` [G, 3], m, and turned about
     its normal [3] through a centre [3] by the third, rad."""
     n = normal / np.linalg.norm(normal)
-    first = np.cross(n, np.eye(3)[np.abs(n).argmin()])
-    first /= np.linalg.norm(first)
-    along = np.stack([first, np.cross(n, first)])
-    K = skew(n)
+    first = across(n)
+    return turned_and_shifted(n, centre, np.stack([first, np.cross(n, first)]), amounts)
+
+
+def turned_and_shifted(axis: NDArray, point: NDArray, along: NDArray, amounts: NDArray) -> NDArray[np.float64]:
+    """Motions [G, 4, 4]: turned about an axis [3], of length 1, through a point [3] by the third of `amounts`
+    [G, 3], rad, then shifted by the others along two directions [2, 3], m."""
+    K = skew(axis)
     sine, cosine = np.sin(amounts[:, 2, None, None]), np.cos(amounts[:, 2, None, None])
     X = np.tile(np.eye(4), (len(amounts), 1, 1))
     X[:, :3, :3] += sine * K + (1 - cosine) * (K @ K)
-    X[:, :3, 3] = centre - X[:, :3, :3] @ centre + amounts[:, :2] @ along
+    X[:, :3, 3] = point - X[:, :3, :3] @ point + amounts[:, :2] @ along
     return X
+
+
+def across(direction: NDArray) -> NDArray[np.float64]:
+    """Some direction [3] across another, of length 1."""
+    first = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
+    return np.asarray(first / np.linalg.norm(first))

@@ -26,6 +26,8 @@ class FramePairMemory(LeafSystem):
         frame: Frame.
         above_table: AboveTable of that frame.
         flow_span: effective flow found in the pair that is in memory [1], pixels.
+        settled_pair: FramePair, that pair as `CameraMotion` has it; where it is left open the table alone tells
+            how far poses err.
 
     Outputs:
         pair: FramePair.
@@ -53,6 +55,7 @@ class FramePairMemory(LeafSystem):
         self._frame = ValueInput(self, "frame", NO_FRAME)
         self._above = ValueInput(self, "above_table", NOTHING_ABOVE_TABLE)
         self._flow_span = self.DeclareVectorInputPort("flow_span", 1)
+        self._settled = ValueInput(self, "settled_pair", NO_PAIR)
         self._memory = self.DeclareAbstractState(AbstractValue.Make(RememberedPair()))
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, offset, self._take_frame)
         for name, read in (
@@ -75,13 +78,16 @@ class FramePairMemory(LeafSystem):
             # Said so, lest all that follows from the state be computed anew: flow, for one.
             return EventStatus.DidNothing()
         # Nothing has flowed before there is a pair: the way to the span leads through both frames.
-        flow_span = 0.0 if memory.pair is NO_PAIR else float(self._flow_span.Eval(context)[0])
+        flow_span = left = 0.0
+        if memory.pair is not NO_PAIR:
+            flow_span = float(self._flow_span.Eval(context)[0])
+            left = self._settled.Eval(context).given_residual if self._settled.HasValue(context) else 0.0
         try:
             above = self._above.Eval(context)
         except NoPlaneError as error:
             following = replace(memory, passed_over=PassedOver(frame.time, str(error)))
         else:
-            following = with_frame(memory, frame, above, flow_span, self._parameters, self._camera_motion)
+            following = with_frame(memory, frame, above, flow_span, self._parameters, self._camera_motion, left)
         state.get_mutable_abstract_state(self._memory).set_value(following)
         return EventStatus.Succeeded()
 

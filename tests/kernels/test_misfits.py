@@ -21,8 +21,10 @@ LEVEL = np.zeros(4, np.float32)
 """Nothing rises or sinks."""
 APART = (np.zeros((21, 41), np.int32), np.array([-1, -2], np.int32))
 """Nothing is known to be a whole: what is seen has the number 0, each piece another one."""
-UNKNOWN = (NO_DEPTH, ONTO_ITSELF, NO_DEPTH, *APART)
-"""Depth of the other view, the way back, and depth of the first; wholes."""
+NOT_TILTED = (ONTO_ITSELF, False)
+"""The way back of what has moved, by a motion that tilts nothing."""
+UNKNOWN = (NO_DEPTH, ONTO_ITSELF, *NOT_TILTED, NO_DEPTH, *APART)
+"""Depth of the other view, the ways back, and depth of the first; wholes."""
 
 
 def pixels(count: int = 800) -> np.ndarray:
@@ -95,7 +97,7 @@ def test_the_factor_is_the_likeliest_one() -> None:
     after = before.copy()
     after[0] = 90
     total, _, _ = misfits(
-        pixels(), before, ones, np.arange(800), 800, ONTO_ITSELF, LEVEL, image(after), *UNKNOWN[:4],
+        pixels(), before, ones, np.arange(800), 800, ONTO_ITSELF, LEVEL, image(after), *UNKNOWN[:6],
         -1 - np.arange(800, dtype=np.int32), 0.003, 0.0, 1e4, NO_SHADOW, PER_DEPTH, 1e4, EXPECTED, NEARER,
     )  # fmt: skip
     assert total[0] - 1 == pytest.approx((90 - 95) ** 2 + 1e4 * 0.05**2)
@@ -127,7 +129,7 @@ def test_depth_costs_its_squared_residual_less_what_is_right(nearer: float, erro
     depth = np.full((21, 41), 0.5 - nearer, np.float32)
     total, _, _ = misfits(
         pixels(), before, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, LEVEL, image(before), depth,
-        ONTO_ITSELF, depth, *APART,
+        ONTO_ITSELF, *NOT_TILTED, depth, *APART,
         0.004, error, CERTAINTY, NO_SHADOW, PER_DEPTH, MOST, EXPECTED, NEARER,
     )  # fmt: skip
     squared = nearer**2 / ((0.004 * 0.25) ** 2 + (error * 0.5) ** 2)
@@ -141,7 +143,7 @@ def test_a_point_that_sinks_by_half_of_that_is_not_covered_but_wrong() -> None:
     sinks = np.array([-0.001, 0, 0, 0.5 * 0.0201], np.float32)
     _, _, covered = misfits(
         pixels(), before, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, sinks, image(before), depth,
-        ONTO_ITSELF, depth, *APART,
+        ONTO_ITSELF, *NOT_TILTED, depth, *APART,
         0.003, 0.0, CERTAINTY, NO_SHADOW, PER_DEPTH, MOST, EXPECTED, NEARER,
     )  # fmt: skip
     # (-0.001 u + 0.0201) / 2 < -0.005 from u = 31 on: nine of 40 columns, in ten rows of each piece.
@@ -158,7 +160,7 @@ def test_a_point_behind_something_is_covered_and_counts_as_expected_whatever_is_
     total, lost, covered = misfits(
         pixels(), before, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, LEVEL,
         image(np.where(np.arange(800) < 120, 0, before)), depth,
-        ONTO_ITSELF, depth, *APART,
+        ONTO_ITSELF, *NOT_TILTED, depth, *APART,
         0.003, 0.0, CERTAINTY, NO_SHADOW, PER_DEPTH, MOST, EXPECTED, NEARER,
     )  # fmt: skip
     np.testing.assert_array_equal([lost, covered], [[0, 0], [120, 0]])
@@ -174,7 +176,8 @@ def test_what_came_there_since_covers_nothing(before: float, stood: bool) -> Non
     depth = np.full((21, 41), 0.45, np.float32)
     _, _, covered = misfits(
         pixels(), values, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, LEVEL, image(values), depth,
-        ONTO_ITSELF, depth_0, *APART, 0.003, 0.0, CERTAINTY, NO_SHADOW, PER_DEPTH, MOST, EXPECTED, NEARER,
+        ONTO_ITSELF, *NOT_TILTED, depth_0, *APART,
+        0.003, 0.0, CERTAINTY, NO_SHADOW, PER_DEPTH, MOST, EXPECTED, NEARER,
     )  # fmt: skip
     np.testing.assert_array_equal(covered, [400 * stood, 400 * stood])
 
@@ -186,13 +189,42 @@ def test_a_thing_that_is_known_to_be_one_does_not_hide_itself() -> None:
     whole_0[:, :11] = 5
     total, _, covered = misfits(
         pixels(), values, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, LEVEL, image(values), depth,
-        ONTO_ITSELF, depth, whole_0, np.array([5, 7], np.int32),
+        ONTO_ITSELF, *NOT_TILTED, depth, whole_0, np.array([5, 7], np.int32),
         0.003, 0.0, CERTAINTY, NO_SHADOW, PER_DEPTH, MOST, EXPECTED, NEARER,
     )  # fmt: skip
     np.testing.assert_array_equal(covered, [400 - 110, 400])
     # What is not covered is 5 cm off: as bad as can be.
     wrong = 1 + PER_DEPTH * (MOST - 1)
     np.testing.assert_allclose(total, [290 * EXPECTED + 110 * wrong, 400 * EXPECTED], rtol=1e-6)
+
+
+@pytest.mark.parametrize("tilts", [True, False])
+@pytest.mark.parametrize(
+    ("came_from", "numbers"),
+    [
+        (-9, (-1, -2)),  # nothing is known of either
+        (7, (7, 8)),  # it came from what is known to be the first piece's own whole
+        (0, (-1, -2)),  # from the table
+    ],
+)
+def test_what_a_body_turns_away_from_view_is_hidden_by_that_body(came_from, numbers, tilts):
+    """All points are 5 cm behind what is seen; that was 5 columns farther right, 2 mm nearer than it is now,
+    and on the right, from column 30 on, 8 mm. Nothing stood where it stands now."""
+    values, depth = pattern(0), np.full((21, 41), 0.45, np.float32)
+    undone = np.array([[1, 0, 5, 0], [0, 1, 0, 0], [0, 0, 1, 0]], np.float32)
+    depth_0 = np.full((21, 41), 0.448, np.float32)
+    depth_0[:, 30:] = 0.442
+    farther = np.eye(3, 4, dtype=np.float32)
+    farther[2, 3] = 1.0  # back without having moved, nothing is where it was
+    whole_0 = np.full((21, 41), came_from, np.int32)
+    _, _, covered = misfits(
+        pixels(), values, np.ones(800, np.float32), PIECE, 2, ONTO_ITSELF, LEVEL, image(values), depth,
+        farther, undone, tilts, depth_0, whole_0, np.array(numbers, np.int32),
+        0.003, 0.0, CERTAINTY, NO_SHADOW, PER_DEPTH, MOST, EXPECTED, NEARER,
+    )  # fmt: skip
+    of_one = [came_from == n or (came_from < 0 and n < 0) for n in numbers]
+    # Within half of a centimetre: columns 0 to 24 of 40, in ten rows of each piece.
+    np.testing.assert_array_equal(covered, [250 * tilts * one for one in of_one])
 
 
 def test_under_any_motion_it_is_what_numpy_and_opencv_find() -> None:
@@ -211,7 +243,8 @@ def test_under_any_motion_it_is_what_numpy_and_opencv_find() -> None:
     depth_0 = np.where(np.arange(80) < 50, 0.4, 0.2) * np.ones((60, 1))
     M = np.array([[1.02, 0.03, -2, 1.2], [-0.02, 0.98, 3, -0.8], [1e-4, -1e-4, 1, 0.004]], np.float32)
     total, lost, covered = misfits(
-        pixel, gray, per_variance, owner, 12, M, LEVEL, gray_1, depth_1, back, depth_0.astype(np.float32),
+        pixel, gray, per_variance, owner, 12, M, LEVEL, gray_1, depth_1, back, *NOT_TILTED,
+        depth_0.astype(np.float32),
         np.zeros((60, 80), np.int32), -1 - np.arange(12, dtype=np.int32),
         0.003, 0.002, CERTAINTY, NO_SHADOW, PER_DEPTH, MOST, EXPECTED, 0.05,
     )  # fmt: skip

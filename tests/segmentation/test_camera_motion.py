@@ -74,6 +74,43 @@ def test_exact_poses_are_left_untouched() -> None:
     assert settled_pair(pair, flow, *above, PoseError(), MeasurementNoise(), PARAMETERS) is pair
 
 
+def test_poses_that_the_images_agree_with_are_exact_whatever_the_table_says_and_something_moves() -> None:
+    pair, flow, above, _ = pair_with_error(Blank(), np.eye(4), moving=0.006)
+    settled = settled_pair(pair, flow, *above, ERRS, MeasurementNoise(), PARAMETERS)
+    np.testing.assert_array_equal(settled.current.X_WC, pair.current.X_WC)
+    assert 0 < settled.residual < 0.3
+    assert settled.given_residual == settled.residual  # not reduced: the whole frame's pixels are its own
+
+
+@pytest.mark.parametrize(("rest", "exact"), [(0.1, True), (0.6, False)])
+def test_what_the_images_left_at_rest_says_whether_poses_are_exact_where_all_moves(rest, exact) -> None:
+    """Two in three of those frames may be of things that move."""
+    pair, flow, above, _ = pair_with_error(Blank(), small_error())  # all seems to move by two pixels
+    known = replace(ERRS, left=(rest,) * 4 + (3.0,) * 8)
+    settled = settled_pair(pair, flow, *above, known, MeasurementNoise(), PARAMETERS)
+    assert np.array_equal(settled.current.X_WC, pair.current.X_WC) == exact
+    assert settled.given_residual > 1
+    if exact:
+        assert settled.residual == pytest.approx(rest)
+
+
+def test_three_frames_say_nothing_yet_of_what_the_images_leave_at_rest() -> None:
+    assert PoseError(left=(0.1,) * 3).by_images == np.inf
+    assert PoseError(left=(0.1,) * 4).by_images == pytest.approx(0.1)
+
+
+def test_what_the_images_left_is_kept_for_the_last_thirty_frames() -> None:
+    frame, _ = DrawnScene(SIZES).frame(0, looking_down(), PLACES)
+    above, known = objects_above_table(frame, AboveTableParameters()), PoseError()
+    assert known.by_images == np.inf
+    for k in range(40):
+        known = renewed_pose_error(known, frame, above, frame, above, PARAMETERS, left=0.01 * (k + 1))
+    assert len(known.left) == 30
+    # The lower quartile of 0.11 to 0.40.
+    assert known.by_images == pytest.approx(0.11 + 0.29 / 4)
+    assert renewed_pose_error(known, frame, above, frame, above, PARAMETERS) is known
+
+
 @pytest.mark.parametrize("table", [Blank(), Texture(9, contrast=10)], ids=["blank table", "textured table"])
 def test_a_table_that_tilts_with_the_depth_does_not_turn_the_camera(table) -> None:
     """As depth that errs smoothly has it: another table in each frame, where the poses are right."""

@@ -148,7 +148,7 @@ JUST_AFTER = OFFSET + 1e-4
 
 def test_ports_have_the_names_of_the_contract() -> None:
     inputs, outputs = port_names(FramePairMemory(PERIOD, OFFSET))
-    assert inputs == ["frame", "above_table", "flow_span"]
+    assert inputs == ["frame", "above_table", "flow_span", "settled_pair"]
     assert outputs == [
         "pair",
         "whole_pair",
@@ -241,8 +241,11 @@ def test_an_unknown_kind_of_pairs_is_refused_with_the_choices() -> None:
         Loop(kind="keyframe").at(2 * PERIOD)
 
 
+@pytest.mark.parametrize("wired", [True, False], ids=["", "settled_pair left open"])
 @pytest.mark.parametrize("given", [True, False])
-def test_the_function_is_handed_the_frame_what_flowed_and_the_parameters(monkeypatch, given: bool) -> None:
+def test_the_function_is_handed_the_frame_what_flowed_what_was_left_and_the_parameters(
+    monkeypatch, given: bool, wired: bool
+) -> None:
     handed = []
 
     def with_frame(memory, frame, *others):
@@ -259,8 +262,14 @@ def test_the_function_is_handed_the_frame_what_flowed_and_the_parameters(monkeyp
         for name, value in (("frame", frame), ("above_table", above_of(number))):
             memory.GetInputPort(name).FixValue(context, Value[object](value))
         memory.GetInputPort("flow_span").FixValue(context, [7.5])
+        if wired:
+            settled = FramePair(frame, frame, given_residual=0.3)
+            memory.GetInputPort("settled_pair").FixValue(context, Value[object](settled))
         simulator.AdvanceTo(number * PERIOD + JUST_AFTER)
     expected = (parameters, camera_motion) if given else (FramePairParameters(), CameraMotionParameters())
     # Nothing has flowed before there is a pair. Values with arrays have no equality: their distances tell.
     assert [above.distance for above, *_ in handed] == [0.0, 1.0]
-    assert [others for _, *others in handed] == [[0.0, *expected], [7.5, *expected]]
+    assert [others for _, *others in handed] == [
+        [0.0, *expected, 0.0],
+        [7.5, *expected, 0.3 if wired else 0.0],
+    ]
