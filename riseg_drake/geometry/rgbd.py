@@ -122,6 +122,8 @@ class FramePair(Immutable):
     """Standard deviation of O_t - E_t where nothing moves, pixels, as far as it was measured."""
     given_residual: float = 0.0
     """The same by the poses as they came, pixels of the whole frame; 0 where that was not asked."""
+    pose_error: float = 0.0
+    """Pixels of the whole frame by which poses that are taken as they came may err; 0: they are exact."""
     span: float = 0.0
     """Effective flow that the reference and the frame before `current` turned out to span, pixels: so far
     had things moved."""

@@ -181,8 +181,9 @@ def settled_pair(
     given = residual(pair.X_C1C0)
     reduction = pair.current.reduction
     pair = replace(pair, given_residual=given * reduction)
-    if min(pair.given_residual, error.by_images) < parameters.exact:
-        return replace(pair, residual=min(given, error.by_images / reduction))
+    at_rest = min(pair.given_residual, error.by_images)
+    if at_rest < parameters.exact:
+        return replace(pair, residual=at_rest / reduction, pose_error=at_rest)
     tried = [pair.X_C1C0]
     for believed in (change, None) if same_plane else (None,):
         V = _fit(p_C0Q, uv_1, residual_sigma, pair, believed, (sigma_R, sigma_p), parameters)

@@ -67,6 +67,8 @@ class Comparison(Immutable):
     view_error: float
     """Share of the camera's motion, pixels, and of depth from another view, by which what stands still seems to
     have moved."""
+    pose_error: float = 0.0
+    """Pixels of the whole frame by which poses err that are taken as they came."""
     body: NDArray[np.intp] | None = None
     """[N], ids, 0 where nothing has moved yet, as in all of them if it is None."""
 
@@ -104,7 +106,7 @@ class Comparison(Immutable):
     @cached_property
     def shift(self) -> float:
         """Pixels by which what stands still seems to have moved."""
-        return self.view_error * self.another_view * _ANOTHER_VIEW / self.frame.reduction
+        return (self.view_error * self.another_view * _ANOTHER_VIEW + self.pose_error) / self.frame.reduction
 
     @cached_property
     def per_variance(self) -> NDArray:

@@ -106,23 +106,22 @@ def agreeing(look: Look, poses: Mapping[int, NDArray[np.float64]]) -> Look:
 def compared_in_motion(now: Segmentation, look: Look) -> Comparison:
     """With the keyframe as it was, or as it was seen again, whichever is more like this frame's view."""
     nearest = min(now.views, key=lambda view: camera_span(view.frame, look.frame))
-    return _compared(now, nearest, look.frame, look.above, look.parameters)
+    return _compared(now, nearest, look.frame, look.above, look)
 
 
 def compared_at_rest(now: Segmentation, look: Look) -> Comparison:
     """With the keyframe, in all pixels."""
     assert now.belief is not None
-    return _compared(now, now.belief.keyframe, look.frame.whole, look.whole_above, look.parameters)
+    return _compared(now, now.belief.keyframe, look.frame.whole, look.whole_above, look)
 
 
-def _compared(
-    now: Segmentation, keyframe: Keyframe, frame: Frame, above: AboveTable, parameters: EvidenceParameters
-) -> Comparison:
+def _compared(now: Segmentation, keyframe: Keyframe, frame: Frame, above: AboveTable, look: Look) -> Comparison:
     assert now.belief is not None
     return Comparison(
         keyframe,
         frame,
         depth_noise=max(above.depth_noise, keyframe.above.depth_noise),
-        view_error=now.view_error.share(parameters.observation.likelihood.view_error),
+        view_error=now.view_error.share(look.parameters.observation.likelihood.view_error),
+        pose_error=look.pair.pose_error,
         body=now.belief.body,
     )

@@ -79,7 +79,8 @@ def test_poses_that_the_images_agree_with_are_exact_whatever_the_table_says_and_
     settled = settled_pair(pair, flow, *above, ERRS, MeasurementNoise(), PARAMETERS)
     np.testing.assert_array_equal(settled.current.X_WC, pair.current.X_WC)
     assert 0 < settled.residual < 0.3
-    assert settled.given_residual == settled.residual  # not reduced: the whole frame's pixels are its own
+    # Not reduced: the whole frame's pixels are its own.
+    assert settled.given_residual == settled.pose_error == settled.residual
 
 
 @pytest.mark.parametrize(("rest", "exact"), [(0.1, True), (0.6, False)])
@@ -90,6 +91,7 @@ def test_what_the_images_left_at_rest_says_whether_poses_are_exact_where_all_mov
     settled = settled_pair(pair, flow, *above, known, MeasurementNoise(), PARAMETERS)
     assert np.array_equal(settled.current.X_WC, pair.current.X_WC) == exact
     assert settled.given_residual > 1
+    assert settled.pose_error == pytest.approx(rest if exact else 0.0)
     if exact:
         assert settled.residual == pytest.approx(rest)
 
