@@ -34,7 +34,9 @@ def with_arrivals(
     area_min: float,
     next_id: int,
 ) -> tuple[NDArray[np.intp], int]:
-    """Ids [N] with those of parts that came, of which nothing is known yet, and the next free one.
+    """Ids [N] with those of parts that came, as far as nothing is known of them yet, and the next free one.
+
+    A part of which more is known than not is that, and has turned.
 
     Args:
         body: [N], ids; 0 where nothing is known to have moved.

@@ -42,7 +42,8 @@ class MotionSearchParameters:
     turn: float = 0.56
     """rad; the largest turn."""
     roll: float = 0.84
-    """rad; the farthest roll of what is round, in as many steps: most of what was seen is in sight still."""
+    """rad; the farthest roll of what is round, in as many steps: most of what was seen is in sight still. 0:
+    nothing rolls."""
     turn_step: float = 0.14
     """rad, between two turns: a step at the rim of a patch."""
     patch: float = 0.022
@@ -295,7 +296,7 @@ class Search:
         amounts = grid.reshape(-1, 3)
         grids = [slides(self._normal, p_KQ.mean(0), amounts)]
         normals = surface_normals(keyframe.frame, keyframe.image_of(patch), v, u)
-        axes = rolling_axes(p_KQ, normals, self._normal)
+        axes = rolling_axes(p_KQ, normals, self._normal) if parameters.roll else []
         grids += [
             rolls(axis, self._normal, amounts * [1, 1, parameters.roll / parameters.turn]) for axis in axes
         ]

@@ -73,6 +73,11 @@ def test_a_part_that_came_gets_an_id_of_its_own_if_nothing_of_it_is_known():
     ids, following = with_arrivals(np.array([0, 0, 0, 0, 4, 0]), part, come, area, 100, 7)
     assert ids.tolist() == [7, 7, 0, 0, 4, 8]
     assert following == 9
+    # Of a part of which something is known the rest is asked, if it is the larger one, and keeps that id apart.
+    for area_known, ids_then in ((99, [4, 7, 7]), (100, [4, 0, 0])):
+        sizes = np.array([area_known, 60, 40])
+        ids, _ = with_arrivals(np.array([4, 0, 0]), np.zeros(3, int), np.array([1, 1, 0], bool), sizes, 100, 7)
+        assert ids.tolist() == ids_then
     # What is too small for an object is none.
     ids, following = with_arrivals(np.zeros(6, int), part, come, area, 101, 7)
     assert (ids.tolist(), following) == ([0] * 6, 7)

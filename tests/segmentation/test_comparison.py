@@ -52,6 +52,15 @@ def test_from_100_pixels_on_it_is_another_view_and_no_more_than_that(keyframe: K
     assert compared.another_view == 1.0
 
 
+def test_poses_that_err_shift_the_image_whatever_the_view_and_leave_depth_as_it_is(keyframe: Keyframe) -> None:
+    at_once = Comparison(keyframe, over(0.0), 0.0023, view_error=0.02, pose_error=0.3)
+    assert (at_once.shift, at_once.depth_error) == pytest.approx((0.3, 0.0))
+    aside = Comparison(keyframe, over(0.2), 0.0023, view_error=0.02, pose_error=0.3)
+    assert (aside.shift, aside.depth_error) == pytest.approx((2.3, 0.02))
+    few = Comparison(keyframe, reduced(over(0.2), 160), 0.0023, view_error=0.02, pose_error=0.3)
+    assert few.shift == pytest.approx(2.3 / 2)
+
+
 def test_superpixels_of_a_known_body_are_one_whole_and_all_others_each_its_own(keyframe: Keyframe) -> None:
     body = np.zeros(keyframe.count, int)
     body[[1, 3]], body[2] = 7, 9

@@ -230,6 +230,33 @@ def test_light_is_freer_the_farther_the_view_is_another_one(
     np.testing.assert_allclose(misfit[points > 0], np.minimum(expected, 9 + 1 - 3 / 14), rtol=0.02)
 
 
+def test_light_is_freer_the_more_a_motion_tilts_and_no_freer_for_a_turn_on_the_table(
+    plate: tuple[Keyframe, Frame], monkeypatch
+) -> None:
+    keyframe, frame = plate
+    plane_W = np.array([0.6, 0.0, 0.8, -0.1])  # a table that slants
+    keyframe = replace(keyframe, above=replace(keyframe.above, plane_W=plane_W))
+    R_KW = keyframe.frame.X_WC[:3, :3].T
+    up_K, along_K = R_KW @ plane_W[:3], R_KW @ np.array([0.0, 1.0, 0.0])
+    asked = []
+
+    def heard(compared, motion, factor, light, tilt, parameters):
+        asked.append((light, tilt))
+        return np.zeros((3, keyframe.count))
+
+    monkeypatch.setattr(likelihood, "_misfit", heard)
+    turns = [0.3 * up_K, 0.3 * along_K, 0.3 * along_K + 0.3 * up_K]
+    motions = np.array([np.eye(4), *(exp_se3(np.append(turn, [0.01, 0.02, 0.0])) for turn in turns)])
+    motion_costs(Comparison(keyframe, frame, DEPTH_NOISE, 0.0), motions, LikelihoodParameters())
+    # Turned by an angle a about an axis at 45 degrees, n leans by b: cos b = 1/2 + cos(a) / 2.
+    both = np.sin(np.arccos(0.5 + np.cos(0.3 * np.sqrt(2)) / 2))
+    for (light, tilt), base, lean in zip(
+        asked, [0.02, 0.05, 0.05, 0.05], [0, 0, np.sin(0.3), both], strict=True
+    ):
+        assert tilt == pytest.approx(lean, abs=1e-9)
+        assert light == pytest.approx(np.hypot(base, 0.6 * lean))
+
+
 def test_where_most_is_explained_by_nothing_yet_that_is_not_taken_for_noise():
     # Ten superpixels of 12 points each, two nats a squared residual, of which a motion explains three.
     misfit = np.full((2, 10), 9.0)

@@ -1,13 +1,23 @@
 """What is round may roll: axes from normals, and the motions about them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RotationMatrix
 
 from riseg_drake.geometry.camera import Intrinsics, rays
-from riseg_drake.geometry.rgbd import Frame
+from riseg_drake.geometry.rgbd import Frame, FramePair
+from riseg_drake.segmentation.belief import BeliefParameters
+from riseg_drake.segmentation.motion_search import MotionSearchParameters, SearchProblem, search_motions
+from riseg_drake.segmentation.motions import flow_difference
+from riseg_drake.segmentation.observation import ObservationParameters
+from riseg_drake.segmentation.recognition import RecognitionParameters
 from riseg_drake.segmentation.rolls import RollingAxis, rolling_axes, rolls, surface_normals
+from tests.segmentation.drawn_scene import first_compared, looking_down, standing
+
+NONE = np.empty((0, 4, 4))
 
 CAMERA = Intrinsics(200, 160, 300.0, 300.0, 99.5, 79.5)
 UP = np.array([0.0, 0.0, -1.0])
@@ -117,3 +127,56 @@ def test_rolls_turn_about_the_axis_and_shift_along_and_across_it():
         np.testing.assert_allclose(X[:3, :3], RotationMatrix(AngleAxis(angle, AXIS)).matrix(), atol=1e-12)
         shift = X[:3, :3] @ MIDDLE + X[:3, 3] - MIDDLE
         np.testing.assert_allclose(shift, along * AXIS + forward * np.cross(UP, AXIS), atol=1e-12)
+
+
+def printed_can(turn, size=(320, 240)):
+    """A frame of a can, lit from one side, of which a pattern has turned about its axis, rad; where it is seen.
+
+    A camera over the table, 0.5 m away.
+    """
+    camera = Intrinsics(*size, 300.0, 300.0, 159.5, 119.5)
+    r = rays(camera).astype(float)
+    across, m = r - (r @ AXIS)[..., None] * AXIS, MIDDLE - (MIDDLE @ AXIS) * AXIS
+    a, b, c = (across**2).sum(-1), across @ m, m @ m - RADIUS**2
+    hit = b**2 > a * c
+    z = np.where(hit, (b - np.sqrt(np.maximum(b**2 - a * c, 0))) / a, 0.5)
+    p = r * z[..., None] - MIDDLE
+    mask = hit & (np.abs(p @ AXIS) < 0.06)
+    side = np.cross(AXIS, UP)
+    angle = np.arctan2(p @ side, p @ UP) - turn
+    # A motion about AXIS by `turn` takes what is printed at an angle to that angle and `turn`.
+    rng = np.random.default_rng(1)
+    waves = rng.uniform(-1, 1, (12, 2)) * [14, 400], rng.uniform(0, 6.3, 12)
+    print_ = sum(np.sin(k * angle + f * (p @ AXIS) + e) for (k, f), e in zip(*waves, strict=True))
+    light = 0.6 + 0.4 * np.clip(p @ (side + UP) / RADIUS / np.sqrt(2), 0, 1)
+    rng = np.random.default_rng(2)
+    gray = np.where(mask, light * (130 + 25 * print_), 150) + 2 * rng.normal(size=z.shape)
+    depth = np.where(mask, z, 0.5) + 0.0006 * rng.normal(size=z.shape)
+    color = np.repeat(np.clip(gray, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
+    X_WC = looking_down(z=0.5)
+    return Frame(0, turn, camera, color, depth.astype(np.float32), X_WC, np.zeros(z.shape, bool)), mask
+
+
+@pytest.mark.parametrize("turn", [0.35, 0.4, 0.45, -0.4])
+def test_a_can_that_has_rolled_where_it_lies_is_found_by_what_is_printed_on_it(turn):
+    (before, mask), (after, _) = printed_can(0.0), printed_can(turn)
+    belief, compared = first_compared(FramePair(before, replace(after, sequence=1)), mask.astype(np.uint16))
+    observation = ObservationParameters()
+
+    def nearest(parameters):
+        problem = SearchProblem(
+            compared,
+            standing(after, mask),
+            np.vstack([belief.part[None], belief.finer]),
+            observation.motion_cost,
+            parameters,
+            observation.likelihood,
+            BeliefParameters().partition.area_min,
+        )
+        true = rolls(RollingAxis(AXIS, MIDDLE), UP, np.array([[0.0, 0.0, turn]]))[0]
+        points = compared.keyframe.edges.p_C0Q
+        return min(flow_difference(points, X, true, 300.0) for X in (np.eye(4), *search_motions(problem, NONE)))
+
+    assert nearest(MotionSearchParameters(recognition=RecognitionParameters(most=0))) < 1.0
+    without = MotionSearchParameters(roll=0.0, recognition=RecognitionParameters(most=0))
+    assert nearest(without) > 3.0

@@ -53,6 +53,8 @@ WITHOUT: dict[str, Switch] = {
     "each frame in motion says all it has": {"segment.evidence.fresh": 1.0},
     "each frame in motion says where all is": {"segment.evidence.area_seen": 0.0},
     "what is seen in pieces is a body each": {"segment.evidence.belief.keyframe.pieces": False},
+    "nothing rolls": {"segment.evidence.search.roll": 0.0},
+    "what tilts is lit as it was": {"segment.evidence.observation.likelihood.light_tilt": 0.0},
     "nothing is recognised": {"segment.evidence.search.recognition.most": 0},
     "alike motions count, however little is shown": {"segment.evidence.observation.touching": -2.0},
 }
