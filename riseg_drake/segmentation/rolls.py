@@ -51,7 +51,7 @@ def surface_normals(
     weight = known[region].astype(np.float64)
     per_depth = np.divide(1.0, frame.depth[region], out=np.zeros(weight.shape), where=known[region])
     k = frame.intrinsics
-    side = 2 * int(np.ceil(_WINDOW * k.fx * float(per_depth.max()))) + 1
+    side = 2 * int(np.ceil(_WINDOW * k.fx / float(np.median(frame.depth[known])))) + 1
     y, x = np.mgrid[: weight.shape[0], : weight.shape[1]].astype(np.float64)
     at = v - region[0].start, u - region[1].start
 
