@@ -1,9 +1,9 @@
 """Pictures of pages as a browser shows them, on a desk and on a telephone:
 
-python -m tests.app.page_pictures out/simulation_seed_0/replay.html out/simulation_seed_0/report.html PATH/site
+python -m tests.app.page_pictures out/simulation_seed_0/replay.html out/simulation_seed_0/report.html site
 python -m tests.app.page_pictures http://localhost:7000 --folder pictures
 
-A PAGE is a file, the folder of a site, or the address at which a run that is going on is seen; a replay is shown
+A PAGE is a file, the folder of a site, or the address at which a run that goes on is seen; a replay is shown
 half way through, too. With `--readme` the replay's only picture is `live.jpg`, without buttons and slider: the
 one that README shows.
 """
