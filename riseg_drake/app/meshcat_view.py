@@ -277,6 +277,9 @@ class MeshcatView(LeafSystem):
         """What the labels say, as a list: things hide each other, and their labels are small."""
         title, texts = count_of(segmentation), label_texts(segmentation)
         words = (title, *texts.values())
+        if not texts:
+            self._turn_to("board", "", time)
+            return
         if words not in self._boards:
             path = self._boards[words] = f"/riseg/board/{len(self._boards) + 1}"
             width, height = BOARD_SIZE
@@ -316,11 +319,14 @@ def count_of(segmentation: Segmentation) -> str:
 
 
 def label_texts(segmentation: Segmentation) -> dict[int, str]:
-    """By object id: the id, how sure it is, and whether that is too little."""
-    texts = {}
-    for a, sure in segmentation.confidence.items():
+    """By object id: the id, how sure it is, and whether that is too little; or that no rest has decided yet."""
+    texts, confidence = {}, segmentation.confidence
+    for a in sorted({*segmentation.object_ids, *confidence}):
+        if a not in confidence:
+            texts[a] = f"{a}  not decided"
+            continue
         state = "" if segmentation.margin[a] >= segmentation.settled else "  in doubt"
-        texts[a] = f"{a}  {100 * sure:.0f} %{state}"
+        texts[a] = f"{a}  {100 * confidence[a]:.0f} %{state}"
     return texts
 
 

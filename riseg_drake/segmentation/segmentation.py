@@ -97,11 +97,12 @@ class Segmentation(Immutable):
 
     @property
     def object_ids(self) -> tuple[int, ...]:
-        """All ids that are held now, in the view or not."""
+        """All ids that are held now, in the view or not; of those that no rest has decided on, what is in the
+        mask."""
         ids = set(self.memory) | set(np.unique(self.mask).tolist()) - {0}
         if self.belief is not None:
             newest = self.bodies[max(self.bodies)].body if self.bodies else self.belief.body
-            ids |= set(np.unique(newest[newest > 0]).tolist())
+            ids |= set(np.unique(newest[(newest > 0) & (newest < self.belief.next_id)]).tolist())
         return tuple(sorted(int(a) for a in ids))
 
     def _sure(self, margin: float) -> float:

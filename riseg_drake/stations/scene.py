@@ -14,7 +14,7 @@ from riseg_drake.stations.placed_object import PlacedObject
 from riseg_drake.stations.placement import check_apart
 from riseg_drake.stations.settling import lay_pile, settle
 
-__all__ = ["PlacedConfig", "SceneConfig", "check_placed", "draw_scene", "make_scene", "place_scene"]
+__all__ = ["PlacedConfig", "SceneConfig", "check_scene", "draw_scene", "make_scene", "place_scene"]
 
 DROP = 2e-4  # m; how far above its resting height an object starts
 LAYOUTS_OF_A_CHOICE = 5
@@ -86,6 +86,10 @@ class SceneConfig:
     placed: list[PlacedConfig] | None = None
     """Objects in places of one's own, at least one; nothing is drawn then."""
 
+    def check(self) -> None:
+        """Raise ValueError for what can never be drawn."""
+        check_scene(self)
+
 
 _DRAWN = tuple(each.name for each in fields(SceneConfig) if each.name not in ("centre_W", "placed"))
 """Keys that say what is drawn."""
@@ -93,13 +97,15 @@ _DRAWN = tuple(each.name for each in fields(SceneConfig) if each.name not in ("c
 
 def make_scene(config: SceneConfig, rng: np.random.Generator) -> list[PlacedObject]:
     """The objects that are placed, or a drawn scene. Raises SceneError."""
-    check_placed(config)
+    check_scene(config)
     return draw_scene(config, rng) if config.placed is None else place_scene(config.placed)
 
 
-def check_placed(config: SceneConfig) -> None:
-    """Raise SceneError where a scene is said to be placed and nothing is, or something to be drawn, too."""
+def check_scene(config: SceneConfig) -> None:
+    """Raise SceneError for what can never be drawn, and where a scene is said to be placed and nothing is, or
+    something to be drawn, too."""
     if config.placed is None:
+        _kind(config)
         return
     if not config.placed:
         raise SceneError("placed: an empty list; expected one object or more, or no `placed`, to draw a scene")

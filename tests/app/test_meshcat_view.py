@@ -107,6 +107,17 @@ def test_a_label_says_how_sure_its_object_is_and_whether_that_is_too_little():
     assert label_texts(segmentation) == {1: "1  50 %  in doubt", 2: "2  88 %"}
 
 
+def test_what_no_rest_has_decided_on_has_a_label_that_says_so():
+    segmentation = Segmentation(0, mask_of(5), Margins({1: 1.0}, {1: 9.0}), settled=2.0)
+    assert label_texts(segmentation) == {1: "1  50 %  in doubt", 5: "5  not decided"}
+
+
+def test_a_view_without_objects_has_no_list():
+    meshcat = Meshcat()
+    panels([(90, 0), (150, 0)], meshcat)
+    assert not meshcat.HasPath("/riseg/board")
+
+
 def test_the_caption_counts_in_words():
     segmentation = Segmentation(0, mask_of(4))
     assert caption_of(2, ArmPhase.PUSH, segmentation) == "interaction 2, push: 1 object found"
@@ -139,7 +150,8 @@ def panels(frames, meshcat):
     for tick, (gray, object_id) in enumerate(frames):
         seen = replace(frame(), sequence=tick, color=np.full((30, 30, 3), gray, np.uint8))
         diagram.GetInputPort("pair").FixValue(context, FramePair(seen, seen))
-        found = Segmentation(tick, mask_of(object_id), Margins({object_id: 1.0}, {object_id: 9.0}))
+        margins = Margins({object_id: 1.0}, {object_id: 9.0}) if object_id else Margins()
+        found = Segmentation(tick, mask_of(object_id), margins)
         diagram.GetInputPort("segmentation").FixValue(context, found)
         simulator.AdvanceTo(0.5 * tick + 0.1)
     number = 0

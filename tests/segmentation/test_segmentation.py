@@ -49,11 +49,17 @@ def test_confidence_is_a_half_at_half_the_settled_margin_and_rises_with_it():
 
 
 def test_ids_are_those_of_the_newest_bodies_of_the_mask_and_of_what_is_remembered():
-    belief = SimpleNamespace(body=np.array([0, 4, 5]))
+    belief = SimpleNamespace(body=np.array([0, 4, 5]), next_id=8)
     bodies = {3: SimpleNamespace(body=np.array([0, 1])), 8: SimpleNamespace(body=np.array([0, 6, 6]))}
     assert Segmentation(9, LABEL, belief=belief).object_ids == (3, 4, 5, 7, 9)
     assert Segmentation(9, LABEL, belief=belief, bodies=bodies).object_ids == (3, 6, 7, 9)
     assert Segmentation(9, LABEL, memory={2: None}).object_ids == (2, 3, 7, 9)
+
+
+def test_what_no_rest_has_decided_on_is_an_object_only_where_the_mask_shows_it():
+    belief = SimpleNamespace(body=np.array([0, 4, 5]), next_id=6)
+    bodies = {8: SimpleNamespace(body=np.array([4, 6, 9]))}  # of 6 and 9 the mask shows 9 alone
+    assert Segmentation(9, LABEL, belief=belief, bodies=bodies).object_ids == (3, 4, 7, 9)
 
 
 def test_before_the_first_frame_there_is_an_empty_mask():

@@ -29,7 +29,7 @@ from riseg_drake.evaluation.step_means import step_deviations, step_means
 from riseg_drake.learned.sam import load_sam
 from riseg_drake.recording.whole_file import write_bytes, write_text
 from riseg_drake.stations.object_models import find_models
-from riseg_drake.stations.scene import check_placed
+from riseg_drake.stations.scene import check_scene
 
 REPORT = "report.md"
 PARTS = "|".join([r"scene_\d+", *map(re.escape, (REPORT, PAGE, FIGURE_FILE))])
@@ -76,7 +76,7 @@ def evaluate_command(request: EvaluationRequest, console: Console) -> None:
     if request.objects is not None:
         scenario.simulated.scene.objects = [str(request.objects.resolve())]
     scene = scenario.simulated.scene
-    check_placed(scene)
+    check_scene(scene)
     if scene.placed is None:  # says it if there are none
         find_models(scene.objects, scene.names)
     name = scenario_name(request.scenario)

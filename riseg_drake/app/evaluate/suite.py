@@ -104,7 +104,7 @@ def find_suite(name_or_folder: str) -> list[Kind]:
         folder = Path(name_or_folder).expanduser()
     paths = sorted(folder.glob("*.yaml"))
     if not paths:
-        known = ", ".join(sorted(path.name for path in built_in.iterdir() if path.is_dir()))
+        known = ", ".join([*sorted(path.name for path in built_in.iterdir() if path.is_dir()), "films"])
         raise ScenarioError(
             f"--suite {name_or_folder}: neither a built-in suite ({known}) nor a folder of scenarios (*.yaml)"
         )

@@ -53,7 +53,7 @@ def run_command(request: RunRequest, console: Console) -> None:
     path, about = request.output or Path("out") / f"{name}_seed_{seed}", {"scenario": name, "seed": seed}
     exports, timeline = Exports(path, request.export, request.export_frames), Timeline(request.rerun, path)
     with RunFolder(path, about, overwrite=request.overwrite) as folder:
-        console.print(f"{name}, seed {seed}, results in {folder.path}")
+        console.print(f"{name}, seed {seed}, results in {folder.path}", soft_wrap=True)
         browser = StartMeshcat() if request.meshcat else None
         with console.status("placing the objects") as status:
             narrator = Narrator(console, status)
@@ -178,11 +178,12 @@ class Narrator:
         f = f", Overlap F {100 * step.scores.overlap_f:.1f} %" if step.scores is not None else ""
         if step.in_motion is not None:
             f += f" ({100 * step.in_motion.overlap_f:.1f} % of what moved, while it moved)"
-        self._console.print(f"{when}: {_objects(step.objects)} found{f}, {self._elapsed()}")
+        line = f"{when}: {_objects(step.objects)} found{f}, {self._elapsed()}"
+        self._console.print(line, soft_wrap=True)
 
     def tell_end(self, progress: Progress) -> None:
         """Say why it is over."""
-        self._console.print(f"ended after {self._elapsed()}: {progress.end}")
+        self._console.print(f"ended after {self._elapsed()}: {progress.end}", soft_wrap=True)
 
     def _elapsed(self) -> str:
         return f"{perf_counter() - self._start:.0f} s"
