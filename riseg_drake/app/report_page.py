@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from riseg_drake.app.package import package_version
 from riseg_drake.app.tables import objects_found, shares_in_percent
-from riseg_drake.evaluation.scores import Scores
+from riseg_drake.evaluation.scores import Scores, numbered_alike
 from riseg_drake.pictures.masks import draw_masks
 from riseg_drake.pictures.object_colors import object_colors
 
@@ -102,10 +102,11 @@ def view(
     truth: NDArray | None = None,
     confidence: Mapping[int, float] | None = None,
 ) -> View:
-    """A picture [H, W, 3] with its mask [H, W] and, where it is known, the truth [H, W], in ids of its own."""
+    """A picture [H, W, 3] with its mask [H, W] and, where it is known, the truth [H, W], in ids of its own, which
+    is shown in those of the mask."""
     layers = {"colour": color, "masks": draw_masks(color, mask, confidence=confidence)}
     if truth is not None:
-        layers["truth"] = draw_masks(color, truth)
+        layers["truth"] = draw_masks(color, numbered_alike(truth, mask))
     return View(caption, (len(color), len(color[0])), {name: _jpeg(layer) for name, layer in layers.items()})
 
 

@@ -125,6 +125,24 @@ def mean_scores(scores: Sequence[Scores]) -> Scores:
     return Scores(*np.mean([astuple(image) for image in scores], axis=0).tolist())
 
 
+def numbered_alike(ground_truth: NDArray, prediction: NDArray) -> NDArray:
+    """The true label image [H, W] with the numbers of the predicted objects [H, W] that its objects are matched
+    with, as for Overlap F; objects that are matched with none have numbers of their own."""
+    true, predicted = _objects(ground_truth), _objects(prediction)
+    number = {int(a): int(predicted.max(initial=0)) + 1 + k for k, a in enumerate(true)}
+    if len(true) and len(predicted):
+        areas = (
+            np.array([np.count_nonzero(labels == a) for a in ids])
+            for labels, ids in ((prediction, predicted), (ground_truth, true))
+        )
+        f, pairs = _assigned(_overlaps(prediction, ground_truth, predicted, true), *areas)
+        number |= {int(true[i]): int(predicted[j]) for i, j in pairs if f[i, j] > 0}
+    alike = np.zeros_like(ground_truth)
+    for a, b in number.items():
+        alike[ground_truth == a] = b
+    return alike
+
+
 def check_labels(labels: NDArray, name: str) -> None:
     """Raise ValueError unless `labels` is a label image: [H, W], integers from 0 up."""
     if labels.ndim != 2 or labels.size == 0:

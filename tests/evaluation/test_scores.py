@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from riseg_drake.evaluation.boundary import boundary_map, dilate, tolerance
-from riseg_drake.evaluation.scores import FIGURES, mean_scores, overlap_f_by_object, score
+from riseg_drake.evaluation.scores import FIGURES, mean_scores, numbered_alike, overlap_f_by_object, score
 
 REFERENCE = (
     Path(os.environ.get("RISEG_EVALUATION", Path(__file__).parents[3] / "shared" / "evaluation"))
@@ -148,3 +148,15 @@ def test_mean_over_images_is_unweighted_and_not_the_f_of_the_means():
 def test_what_is_no_label_image_of_the_same_size_is_refused(prediction, message):
     with pytest.raises(ValueError, match=message):
         score(prediction, TWO)
+
+
+def test_true_objects_are_numbered_as_what_they_are_matched_with_and_others_after_those():
+    truth = np.zeros((4, 12), np.uint16)
+    truth[:, :4], truth[:, 4:8], truth[:, 8:10] = 1, 2, 5
+    found = np.zeros_like(truth)
+    # 7 lies on most of 1 and a little of 2, 1 on the rest of 2; nothing on 5.
+    found[:, :5], found[:, 5:8] = 7, 1
+    alike = numbered_alike(truth, found)
+    assert alike[0].tolist() == [7] * 4 + [1] * 4 + [10] * 2 + [0] * 2
+    assert numbered_alike(truth, np.zeros_like(truth))[0].tolist() == [1] * 4 + [2] * 4 + [3] * 2 + [0] * 2
+    assert not numbered_alike(np.zeros_like(truth), found).any()
