@@ -102,8 +102,8 @@ def view(
     truth: NDArray | None = None,
     confidence: Mapping[int, float] | None = None,
 ) -> View:
-    """A picture [H, W, 3] with its mask [H, W] and, where it is known, the truth [H, W], in ids of its own, which
-    is shown in those of the mask."""
+    """A picture [H, W, 3] with its mask [H, W] and, if it is known, the truth [H, W] in ids of its own, that is
+    shown in those of the mask."""
     layers = {"colour": color, "masks": draw_masks(color, mask, confidence=confidence)}
     if truth is not None:
         layers["truth"] = draw_masks(color, numbered_alike(truth, mask))

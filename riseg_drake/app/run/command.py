@@ -215,7 +215,7 @@ def state_of(folder: RunFolder, progress: Progress, steps: list[Step]) -> Iterat
         folder.write_report(run_report(folder.summary, steps))
 
     def left() -> str:
-        return f"{len(steps)} finished step{'' if len(steps) == 1 else 's'} in {folder.path}"
+        return f"{len(steps)} finished step{'' if len(steps) == 1 else 's'}; to look at: {folder.path / REPORT}"
 
     with end_noted(finish, left):
         yield

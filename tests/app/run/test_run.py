@@ -181,7 +181,7 @@ def test_a_run_that_is_stopped_leaves_whole_steps_and_exit_code_130(
     assert not list((tmp_path / "out").rglob("*.unfinished"))
     assert len(list(RecordingReader(tmp_path / "out" / "recording"))) in (19, 20)
     error = capsys.readouterr().err
-    assert error == f"riseg: stopped; 1 finished step in {tmp_path / 'out'}\n"
+    assert error == f"riseg: stopped; 1 finished step; to look at: {tmp_path / 'out' / 'report.html'}\n"
 
 
 def test_a_run_whose_contact_solver_fails_leaves_whole_steps_and_one_line(
