@@ -99,9 +99,9 @@ def _axis(
         along_B = np.linalg.eigh(arm.T @ arm + C_vw.T @ v_of)[1][:, which]
         omega, v = B @ along_B, v_of @ along_B
         velocity = v + np.cross(omega, q)
-        across = np.abs((normals * velocity).sum(1))
-        trusted = across <= np.quantile(across, _TRUSTED)
-    share = np.sqrt((across[trusted] ** 2).mean() / (velocity[trusted] ** 2).sum(1).mean())
+        off = np.abs((normals * velocity).sum(1))
+        trusted = off <= np.quantile(off, _TRUSTED)
+    share = np.sqrt((off[trusted] ** 2).mean() / (velocity[trusted] ** 2).sum(1).mean())
     point = np.cross(omega, v)
     arm = q - point
     radius = ((arm - np.outer(arm @ omega, omega)) * normals).sum(1)[trusted].mean()

@@ -4,6 +4,8 @@ There a step of a grid of motions leads into the right valley, which others go d
 light that glances off it stays where it is: there only what is printed is compared, without what is broad.
 """
 
+from functools import cached_property
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -27,18 +29,24 @@ class SlideCosts:
         self._compared, self._residual_max = compared, residual_max
         gray_0 = compared.keyframe.frame.gray
         self._gray_0, self._gray_1 = (cv2.GaussianBlur(g, (0, 0), blur) for g in (gray_0, compared.frame.gray))
-        self._printed_0, self._printed_1 = (
-            g - cv2.GaussianBlur(g, (0, 0), _BROAD * blur) for g in (self._gray_0, self._gray_1)
-        )
+        self._blur = blur
         gradient = np.hypot(*(cv2.Sobel(gray_0, cv2.CV_32F, *d, scale=0.125) for d in ((1, 0), (0, 1))))
         self._variance = 8 + (0.5 * blur * cv2.GaussianBlur(gradient, (0, 0), blur)) ** 2
         self._standing = standing.astype(np.float32)
+
+    @cached_property
+    def _printed(self) -> tuple[NDArray, NDArray]:
+        """Both images without what is broad."""
+        first, second = (
+            gray - cv2.GaussianBlur(gray, (0, 0), _BROAD * self._blur) for gray in (self._gray_0, self._gray_1)
+        )
+        return first, second
 
     def of(
         self, p_KQ: NDArray, v: NDArray, u: NDArray, motions_K: NDArray, *, lit_anew: bool = False
     ) -> NDArray:
         """Mean squared residuals [G] under motions [G, 4, 4] of points [S, 3], m, at pixels v, u [S]."""
-        image_0, image_1 = (self._printed_0, self._printed_1) if lit_anew else (self._gray_0, self._gray_1)
+        image_0, image_1 = self._printed if lit_anew else (self._gray_0, self._gray_1)
         gray_0, variance = image_0[v, u], self._variance[v, u]
         parts = (self._costs(p_KQ, gray_0, image_1, variance, some) for some in _some_at_once(motions_K))
         return np.concatenate(list(parts))
