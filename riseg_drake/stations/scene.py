@@ -87,8 +87,9 @@ class SceneConfig:
     """Objects in places of one's own, at least one; nothing is drawn then."""
 
     def check(self) -> None:
-        """Raise ValueError for what can never be drawn."""
-        check_scene(self)
+        """Raise ValueError for what can never be drawn; whether it is to be drawn at all, making it tells."""
+        if self.placed is None:
+            check_scene(self)
 
 
 _DRAWN = tuple(each.name for each in fields(SceneConfig) if each.name not in ("centre_W", "placed"))

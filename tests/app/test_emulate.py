@@ -179,7 +179,8 @@ def test_a_scene_that_cannot_be_is_said_once_in_one_line(tmp_path):
         [sys.executable, "-m", "riseg_drake", "emulate", str(scenario)], capture_output=True, text=True
     )
     assert ended.returncode == 2
-    assert ended.stderr == "riseg: count_min, count_max: 0, 6; expected 1 <= min <= max\n"
+    where = f"{scenario}: line 1: station.scene."
+    assert ended.stderr == f"riseg: {where}count_min, count_max: 0, 6; expected 1 <= min <= max\n"
 
 
 @pytest.mark.parametrize("option", ["--say", "--fault"])
