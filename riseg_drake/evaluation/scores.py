@@ -105,17 +105,8 @@ def overlap_f_by_object(prediction: NDArray, ground_truth: NDArray) -> dict[int,
 
     Both are label images [H, W]; the assignment is that of `score`.
     """
-    predicted = _objects(prediction)
-    true = _objects(ground_truth)
-    by_object = dict.fromkeys(true.tolist(), 0.0)
-    if len(predicted) == 0 or len(true) == 0:
-        return by_object
-    predicted_area = np.array([_area(prediction == j) for j in predicted])
-    true_area = np.array([_area(ground_truth == i) for i in true])
-    tp = _overlaps(prediction, ground_truth, predicted, true)
-    f, pairs = _assigned(tp, predicted_area, true_area)
-    by_object.update((int(true[i]), float(f[i, j])) for i, j in pairs)
-    return by_object
+    by_object = dict.fromkeys(_objects(ground_truth).tolist(), 0.0)
+    return by_object | {i: f for i, _, f in _matched(prediction, ground_truth)}
 
 
 def mean_scores(scores: Sequence[Scores]) -> Scores:
@@ -128,15 +119,8 @@ def mean_scores(scores: Sequence[Scores]) -> Scores:
 def numbered_alike(ground_truth: NDArray, prediction: NDArray) -> NDArray:
     """The true label image [H, W] with the numbers of the predicted objects [H, W] that its objects are matched
     with, as for Overlap F; objects that are matched with none have numbers of their own."""
-    true, predicted = _objects(ground_truth), _objects(prediction)
-    number = {int(a): int(predicted.max(initial=0)) + 1 + k for k, a in enumerate(true)}
-    if len(true) and len(predicted):
-        areas = (
-            np.array([np.count_nonzero(labels == a) for a in ids])
-            for labels, ids in ((prediction, predicted), (ground_truth, true))
-        )
-        f, pairs = _assigned(_overlaps(prediction, ground_truth, predicted, true), *areas)
-        number |= {int(true[i]): int(predicted[j]) for i, j in pairs if f[i, j] > 0}
+    number = {int(a): int(prediction.max()) + k for k, a in enumerate(_objects(ground_truth), start=1)}
+    number |= {i: j for i, j, f in _matched(prediction, ground_truth) if f > 0}
     alike = np.zeros_like(ground_truth)
     for a, b in number.items():
         alike[ground_truth == a] = b
@@ -172,6 +156,17 @@ def _overlaps(prediction: NDArray, ground_truth: NDArray, predicted: NDArray, tr
     j = np.searchsorted(predicted, prediction[both])
     cells = np.bincount(i * len(predicted) + j, minlength=len(true) * len(predicted))
     return cells.reshape(len(true), len(predicted))
+
+
+def _matched(prediction: NDArray, ground_truth: NDArray) -> list[tuple[int, int, float]]:
+    """The true and the predicted object of each pair that is assigned, and the pair's Overlap F."""
+    predicted, true = _objects(prediction), _objects(ground_truth)
+    if len(predicted) == 0 or len(true) == 0:
+        return []
+    predicted_area = np.array([_area(prediction == j) for j in predicted])
+    true_area = np.array([_area(ground_truth == i) for i in true])
+    f, pairs = _assigned(_overlaps(prediction, ground_truth, predicted, true), predicted_area, true_area)
+    return [(int(true[i]), int(predicted[j]), float(f[i, j])) for i, j in pairs]
 
 
 def _assigned(

@@ -15,7 +15,7 @@ def _sinks(rises: NDArray[np.float32], pixel: NDArray[np.float32], n: int, depth
 
 
 @compiled()
-def _stood(
+def _seen_before(
     back: NDArray[np.float32],
     u: Real,
     v: Real,
@@ -24,34 +24,14 @@ def _stood(
     near: Real,
     whole_0: NDArray[np.int32],
     whole: int,
+    same: bool,
 ) -> bool:
-    """Whether what is seen at (u, v) and depth z, m, was seen there before, within `near`, m, and belongs to
-    another `whole`."""
-    place = np.floor(u + np.float32(0.5)), np.floor(v + np.float32(0.5))
-    u, v, c = placed(back, place[0], place[1], 1 / z)
-    apart = nearest(depth_0, u, v) - c * z
-    return bool(-near < apart < near and nearest(whole_0, u, v) != whole)
-
-
-@compiled()
-def _turned_away(
-    undone: NDArray[np.float32],
-    u: Real,
-    v: Real,
-    z: Real,
-    depth_0: NDArray[np.float32],
-    near: Real,
-    whole_0: NDArray[np.int32],
-    whole: int,
-) -> bool:
-    """Whether what is seen at (u, v) and depth z, m, has come by the motion of the point that it hides from
-    where it was seen, within `near`, and is of the same `whole`, as far as that is known: a body that turns
-    hides what it showed."""
-    u, v, c = placed(undone, np.floor(u + np.float32(0.5)), np.floor(v + np.float32(0.5)), 1 / z)
-    came_from = nearest(whole_0, u, v)
-    of_one = came_from == whole or (came_from < 0 and whole < 0)
-    apart = nearest(depth_0, u, v) - c * z
-    return bool(of_one and -near < apart < near)
+    """Whether what is seen at (u, v) and depth z, m, was seen where it was before, within `near`, and is of
+    another `whole`, or where that is asked of the `same` one, as far as is known."""
+    u, v, c = placed(back, np.floor(u + np.float32(0.5)), np.floor(v + np.float32(0.5)), 1 / z)
+    apart, number = nearest(depth_0, u, v) - c * z, nearest(whole_0, u, v)
+    fits = (number == whole or (number < 0 and whole < 0)) if same else number != whole
+    return bool(fits and -near < apart < near)
 
 
 @compiled(
@@ -133,10 +113,11 @@ def misfits(
         z, z_1 = c / pixel[3, n], nearest(depth_1, u, v)
         variance = (depth_noise * z * z) ** 2 + (depth_error * z) ** 2
         in_front = 0 < z_1 < z - nearer and (z_1 - z) ** 2 > most * variance
+        # A body that turns hides what it showed; what stood before a place hides what goes there.
         if in_front and (
-            (tilts and _turned_away(undone, u, v, z_1, depth_0, nearer / 2, whole_0, whole[p]))
+            (tilts and _seen_before(undone, u, v, z_1, depth_0, nearer / 2, whole_0, whole[p], True))
             or (
-                _stood(back, u, v, z_1, depth_0, nearer, whole_0, whole[p])
+                _seen_before(back, u, v, z_1, depth_0, nearer, whole_0, whole[p], False)
                 and not _sinks(rises, pixel, n, nearer / 2)
             )
         ):

@@ -122,6 +122,11 @@ class Keyframe(Immutable):
         """[H, W], what stands there, and four pixels around it."""
         return cv2.dilate(self.above.mask.view(np.uint8), np.ones((9, 9), np.uint8)).view(bool)
 
+    @cached_property
+    def plane_K(self) -> NDArray[np.float64]:
+        """[4], the table's plane in the keyframe's own camera."""
+        return self.above.plane_W @ self.frame.X_WC
+
     @property
     def pixels_per_metre(self) -> float:
         """How large things appear, about, pixels a metre."""

@@ -225,13 +225,12 @@ def _misfit(
 
 def _tilt(keyframe: Keyframe, motion_K: NDArray[np.float64]) -> float:
     """Sine of the angle by which a motion [4, 4] turns what was across the table."""
-    n_K = keyframe.frame.X_WC[:3, :3].T @ keyframe.above.plane_W[:3]
+    n_K = keyframe.plane_K[:3]
     return float(np.linalg.norm(np.cross(n_K, motion_K[:3, :3] @ n_K)))
 
 
 def _rises(keyframe: Keyframe, motion_K: NDArray[np.float64]) -> NDArray[np.float32]:
     """[4], of which the product with a point's (u, v, 1, 1 / z) is by how much a motion [4, 4] raises it above
     the table, divided by its depth z."""
-    plane_K = keyframe.above.plane_W @ keyframe.frame.X_WC
-    rises = plane_K @ (motion_K - np.eye(4))
+    rises = keyframe.plane_K @ (motion_K - np.eye(4))
     return of_pixels(rises[None], keyframe.frame.intrinsics)[0].astype(np.float32)

@@ -153,7 +153,7 @@ class Search:
         self._parameters, self._likelihood = problem.parameters, problem.likelihood
         self._fit = rigid_fit(compared.pair, compared.depth_noise)
         self._rng = np.random.default_rng(compared.keyframe.frame.sequence)
-        self._normal = compared.keyframe.frame.X_WC[:3, :3].T @ compared.keyframe.above.plane_W[:3]
+        self._normal = compared.keyframe.plane_K[:3]
         self.found: list[NDArray] = list(known_K)
         """Motions [4, 4]."""
         self.costs = motion_costs(compared, np.concatenate([np.eye(4)[None], known_K]), problem.likelihood)
@@ -295,8 +295,10 @@ class Search:
         grid = np.stack(np.meshgrid(shifts, shifts, turns, indexing="ij"), axis=-1)
         amounts = grid.reshape(-1, 3)
         grids = [slides(self._normal, p_KQ.mean(0), amounts)]
-        normals = surface_normals(keyframe.frame, keyframe.image_of(patch), v, u)
-        axes = rolling_axes(p_KQ, normals, self._normal) if parameters.roll else []
+        axes = []
+        if parameters.roll:
+            normals = surface_normals(keyframe.frame, keyframe.image_of(patch), v, u)
+            axes = rolling_axes(p_KQ, normals, self._normal)
         grids += [
             rolls(axis, self._normal, amounts * [1, 1, parameters.roll / parameters.turn]) for axis in axes
         ]

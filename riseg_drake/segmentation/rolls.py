@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from riseg_drake.geometry.camera import bounding_region
 from riseg_drake.geometry.rgbd import Frame
 from riseg_drake.segmentation.scales import LOWEST
-from riseg_drake.segmentation.slides import across, turned_and_shifted
+from riseg_drake.segmentation.slides import along_plane, turned_and_shifted
 
 _WINDOW = 2 * LOWEST
 """m; surface within so much around a point tells how it lies there."""
@@ -78,10 +78,8 @@ def rolling_axes(
     """Axes that lie as the table does, about which points [S, 3], m, with normals [S, 3] turn along their own
     surface: none of what has edges, one of what lies like a can, two of a ball. `up` [3] is across the table.
     """
-    first = across(up)
-    B = np.column_stack([first, np.cross(up / np.linalg.norm(up), first)])
     middle = p_KQ.mean(0)
-    axes = (_axis(p_KQ - middle, normals, B, which) for which in range(2))
+    axes = (_axis(p_KQ - middle, normals, along_plane(up).T, which) for which in range(2))
     return [RollingAxis(axis.direction, middle + axis.point) for axis in axes if axis is not None]
 
 

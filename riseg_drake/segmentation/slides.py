@@ -103,9 +103,7 @@ def _some_at_once(motions_K: NDArray) -> list[NDArray]:
 def slides(normal: NDArray, centre: NDArray, amounts: NDArray) -> NDArray[np.float64]:
     """Motions [G, 4, 4] of things on a plane: shifted along it by two of `amounts` [G, 3], m, and turned about
     its normal [3] through a centre [3] by the third, rad."""
-    n = normal / np.linalg.norm(normal)
-    first = across(n)
-    return turned_and_shifted(n, centre, np.stack([first, np.cross(n, first)]), amounts)
+    return turned_and_shifted(normal / np.linalg.norm(normal), centre, along_plane(normal), amounts)
 
 
 def turned_and_shifted(axis: NDArray, point: NDArray, along: NDArray, amounts: NDArray) -> NDArray[np.float64]:
@@ -119,7 +117,9 @@ def turned_and_shifted(axis: NDArray, point: NDArray, along: NDArray, amounts: N
     return X
 
 
-def across(direction: NDArray) -> NDArray[np.float64]:
-    """Some direction [3] across another, of length 1."""
-    first = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
-    return np.asarray(first / np.linalg.norm(first))
+def along_plane(normal: NDArray) -> NDArray[np.float64]:
+    """Two directions [2, 3], of length 1 and across each other, in a plane of some normal [3]."""
+    n = normal / np.linalg.norm(normal)
+    first = np.cross(n, np.eye(3)[np.abs(n).argmin()])
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(n, first)])

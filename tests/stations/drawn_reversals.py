@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 
 from riseg_drake.geometry.rgbd import Frame
@@ -94,16 +95,16 @@ class Table:
 def on_the_way(
     start: Sequence[RigidTransform], end: Sequence[RigidTransform], frames: int
 ) -> Iterator[list[RigidTransform]]:
-    """Poses between two, a frame after the other, the last one at the end: things slide and turn about z."""
+    """Poses between two, a frame after the other, the last one at the end."""
     for k in range(1, frames + 1):
         yield [_between(a, b, k / frames) for a, b in zip(start, end, strict=True)]
 
 
 def _between(a: RigidTransform, b: RigidTransform, share: float) -> RigidTransform:
-    R = b.rotation().multiply(a.rotation().inverse()).matrix()
-    yaw = np.arctan2(R[1, 0], R[0, 0]) * share
+    turn = b.rotation().multiply(a.rotation().inverse()).ToAngleAxis()
+    R = RotationMatrix(AngleAxis(turn.angle() * share, turn.axis()))
     p = (1 - share) * a.translation() + share * b.translation()
-    return RigidTransform(RotationMatrix.MakeZRotation(yaw).multiply(a.rotation()), p)
+    return RigidTransform(R.multiply(a.rotation()), p)
 
 
 def drawn_motion(rng: np.random.Generator) -> tuple[float, NDArray[np.float64]]:

@@ -13,7 +13,7 @@ from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 
 from riseg_drake.stations.object_models import ObjectModel, find_models
-from tests.stations.drawn_reversals import FOLDERS, FRAMES, PLACES, REST, Table, standing
+from tests.stations.drawn_reversals import FOLDERS, PLACES, REST, Table, go, standing
 
 ROUND = ("can_soda_lying", "bottle_water_lying", "bottle_sauce_lying")
 STILL = ("carton_tea", "carton_pasta")
@@ -36,13 +36,6 @@ def rolled(model: ObjectModel, X_WB: RigidTransform, angle: float) -> RigidTrans
     )
 
 
-def between(a: RigidTransform, b: RigidTransform, share: float) -> RigidTransform:
-    """A pose on the way from one to another."""
-    turn = b.rotation().multiply(a.rotation().inverse()).ToAngleAxis()
-    R = RotationMatrix(AngleAxis(turn.angle() * share, turn.axis())).multiply(a.rotation())
-    return RigidTransform(R, (1 - share) * a.translation() + share * b.translation())
-
-
 def outcome(seed: int) -> tuple[list[tuple[str, float, dict[int, float]]], list[str]]:
     """Of each thing that rolled its name, by how many degrees, and the share of each id on it; and the names of
     what stood still and has an id."""
@@ -55,10 +48,7 @@ def outcome(seed: int) -> tuple[list[tuple[str, float, dict[int, float]]], list[
     end = [*map(rolled, chosen[:2], start[:2], angles), *start[2:]]
     table = Table(chosen, seed)
     table.watch(start, REST)
-    for k in range(1, FRAMES + 1):
-        way = [between(a, b, k / FRAMES) for a, b in zip(start, end, strict=True)]
-        table.watch(way, share=np.sin(np.pi * k / FRAMES))
-    table.watch(end, REST)
+    go(table, start, end)
     ids = table.ids()
     rolling = list(zip(names[:2], np.degrees(angles).tolist(), ids[:2], strict=True))
     return rolling, [name for name, found in zip(names[2:], ids[2:], strict=True) if found]
